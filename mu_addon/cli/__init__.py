@@ -41,10 +41,7 @@ NAMES = (
 )
 
 
-_MODULES = {
-    **dict.fromkeys(("presets", "design", "simulate", "place"), "study"),
-    **dict.fromkeys(("ports", "record", "replay"), "stream"),
-}
+_MODULES = dict.fromkeys(("ports", "record", "replay"), "stream")
 """Modules of commands that share one; each of its functions has its command's name, except a shared `run`."""
 
 

@@ -129,18 +129,6 @@ def add_orientation(command: Group) -> None:
     )
 
 
-def add_resin(command: Group) -> None:
-    """--resin, the material of the wall."""
-    command.add_argument(
-        "--resin",
-        dest="wall_resin",
-        metavar="NAME|FILE",
-        help="Material of the wall: a name of the library or a material file, such as the material.toml of "
-        "`fit-material`. Its moduli, law and memory replace those of the unit's [material] and [wall] "
-        "(default: those of the unit).",
-    )
-
-
 def add_device(command: Group) -> None:
     """--device."""
     from ..fem.device import DEVICE
@@ -152,23 +140,6 @@ def add_measured_folder(command: argparse.ArgumentParser, help_: str = "") -> No
     """FOLDER, a folder of measured data."""
     words = help_ or "Folder of measured data: experiments.toml and its CSV files."
     command.add_argument("folder", metavar="FOLDER", help=words)
-
-
-def add_solid(command: Group) -> None:
-    """Add the option for the STL's facet resolution."""
-    from ..design.settings import QUALITY
-
-    add_setting(command, QUALITY)
-
-
-def add_body(command: Group) -> None:
-    """Options of a user-defined body."""
-    command.add_argument(
-        "--body",
-        metavar="FILE",
-        help="Closed surface that the lattice fills in place of its box: STL, OBJ or PLY, in mm, in the "
-        "unit's frame. It is cut flat at both ends of the unit.",
-    )
 
 
 def add_obstacles(command: Group) -> None:

@@ -12,10 +12,13 @@ from ..studies import study
 from .options import (
     add_measured_folder,
     add_model,
+    add_obstacles,
+    add_orientation,
     add_report,
     add_results,
     add_setting,
     add_unit,
+    modelled,
     modelled_unit,
     presets,
     require_out,
@@ -28,14 +31,14 @@ if TYPE_CHECKING:
     from .options import Commands
 
 
-def _add_unit(command: argparse.ArgumentParser, one: Any) -> None:
+def _add_unit(command: Any, one: Any) -> None:
     add_unit(command, one.needed and not one.default, results=False)
-    if one.needed and not one.default:
+    if one.modelled and one.needed and not one.default:
         add_model(command)
 
 
-def _unit(options: argparse.Namespace, context: RunContext, one: Any) -> Any:
-    if hasattr(options, "model"):
+def _unit(options: argparse.Namespace, context: RunContext, one: Any, values: dict[str, Any]) -> Any:
+    if one.modelled and hasattr(options, "model"):
         return modelled_unit(options, context)
     from ..design.parameters import load_preset
 
@@ -43,61 +46,82 @@ def _unit(options: argparse.Namespace, context: RunContext, one: Any) -> Any:
     return load_preset(one.default) if found is None and one.default else found
 
 
-def _add_measured(command: argparse.ArgumentParser, one: Any) -> None:
+def _add_measured(command: Any, one: Any) -> None:
     add_measured_folder(command, one.text)
 
 
-def _measured(options: argparse.Namespace, context: RunContext, one: Any) -> Any:
+def _measured(options: argparse.Namespace, context: RunContext, one: Any, values: Any) -> Any:
     from ..measured import read_folder
 
     return read_folder(Path(options.folder))
 
 
-def _add_gripper(command: argparse.ArgumentParser, one: Any) -> None:
+def _add_gripper(command: Any, one: Any) -> None:
     which = command.add_mutually_exclusive_group(required=True)
     which.add_argument("--preset", metavar="NAME", help=f"Gripper preset: {presets('gripper')}.")
     which.add_argument("--gripper", metavar="FILE", help="Gripper parameters, a TOML file.")
 
 
-def _gripper(options: argparse.Namespace, context: RunContext, one: Any) -> Any:
+def _gripper(options: argparse.Namespace, context: RunContext, one: Any, values: Any) -> Any:
     from ..design.gripper import load_gripper, read_gripper
 
     return load_gripper(options.preset) if options.preset is not None else read_gripper(options.gripper)
 
 
-def _add_bending(command: argparse.ArgumentParser, one: Any) -> None:
+def _add_bending(command: Any, one: Any) -> None:
     words = "Recordings, or folders of measured data of the kind waveguide_bending."
     command.add_argument("data", nargs="+", metavar="FOLDER", help=words)
 
 
-def _bending(options: argparse.Namespace, context: RunContext, one: Any) -> Any:
+def _bending(options: argparse.Namespace, context: RunContext, one: Any, values: Any) -> Any:
     return tuple(map(Path, options.data))
 
 
-def _add_file(command: argparse.ArgumentParser, one: Any) -> None:
+def _add_file(command: Any, one: Any) -> None:
     command.add_argument("file", metavar="FILE", help=one.text)
 
 
-def _design(options: argparse.Namespace, context: RunContext, one: Any) -> Any:
+def _design(options: argparse.Namespace, context: RunContext, one: Any, values: Any) -> Any:
     from ..optimization import read_design
 
     return read_design(Path(options.file))
 
 
-def _plan(options: argparse.Namespace, context: RunContext, one: Any) -> Any:
+def _plan(options: argparse.Namespace, context: RunContext, one: Any, values: Any) -> Any:
     from ..usecases.parameter_study.plan import read_plan
 
     return read_plan(Path(options.file)).continued(Path(options.out) / "sweep.toml", options.add)
 
 
-def _add_model(command: argparse.ArgumentParser, one: Any) -> None:
+def _add_model(command: Any, one: Any) -> None:
     add_model(command)
 
 
-def _model(options: argparse.Namespace, context: RunContext, one: Any) -> Any:
+def _model(options: argparse.Namespace, context: RunContext, one: Any, values: Any) -> Any:
     from ..evidence import load_model
 
     return None if options.model is None else load_model(Path(options.model))
+
+
+def _add_effects(command: Any, one: Any) -> None:
+    add_model(command)
+    add_orientation(command)
+
+
+def _effects(options: argparse.Namespace, context: RunContext, one: Any, values: dict[str, Any]) -> Any:
+    # The model changes the unit's parameters, too.
+    values["unit"], effects = modelled(options, context)
+    return effects
+
+
+def _add_obstacles(command: Any, one: Any) -> None:
+    add_obstacles(command)
+
+
+def _obstacles(options: argparse.Namespace, context: RunContext, one: Any, values: dict[str, Any]) -> Any:
+    from ..studies.unit_inputs import obstacles_for
+
+    return obstacles_for(values["unit"], options.obstacles, values["body"]) if options.obstacles else ()
 
 
 OBJECTS = {
@@ -106,7 +130,9 @@ OBJECTS = {
     "measured": (_add_measured, _measured),
     "bending": (_add_bending, _bending),
     "design": (_add_file, _design),
+    "effects": (_add_effects, _effects),
     "model": (_add_model, _model),
+    "obstacles": (_add_obstacles, _obstacles),
     "plan": (_add_file, _plan),
 }
 """By kind of an input that is no plain value: its options are added, its value made of them."""
@@ -115,21 +141,37 @@ OBJECTS = {
 def command_of(name: str) -> tuple[Callable[[Any], None], Callable[[Any, Any], None]]:
     """What adds the subcommand of a study, and what starts it."""
     kind = study(name)
-    return lambda commands: _add(commands, kind), lambda options, context: _run(kind, options, context)
+    return lambda commands: _add(commands, kind, name), lambda options, context: _run(
+        kind, name, options, context
+    )
 
 
-def _add(commands: Commands[Any], kind: type[Study]) -> None:
+def _targets(kind: type[Study], name: str) -> tuple[str, ...]:
+    """Targets of a study's command; "" alone of a study without."""
+    return tuple([*kind.commands][: [*kind.commands].index(name) + 1]) if kind.commands else ("",)
+
+
+def _asked(kind: type[Study], name: str) -> dict[str, Input]:
+    """Inputs that a study's command asks for."""
+    return {n: one for n, one in kind.inputs().items() if one.target in _targets(kind, name)}
+
+
+def _add(commands: Commands[Any], kind: type[Study], name: str) -> None:
     words = " ".join(inspect.getdoc(kind).split("\n\n")[0].split())  # type: ignore[union-attr]
-    command = commands.add_parser(kind.name, help=words, epilog=f"example: run.py {kind.example}")
+    words, example = kind.commands.get(name, (words, kind.example))
+    command = commands.add_parser(name, help=words, epilog=f"example: run.py {example}")
     if kind.from_file[0]:
         command.add_argument("file", metavar="FILE", help=kind.from_file[0])
-    for one in kind.inputs().values():
+    groups: dict[str, Any] = {"": command}
+    for one in _asked(kind, name).values():
+        if one.group not in groups:
+            groups[one.group] = command.add_argument_group(one.group)
         if one.descriptions:
-            _add_values(command, one)
+            _add_values(groups[one.group], one)
             if kind.from_file[0]:
                 command.set_defaults(**{_dest(one): None})
         elif one.kind in OBJECTS:
-            OBJECTS[one.kind][0](command, one)
+            OBJECTS[one.kind][0](groups[one.group], one)
     add_results(command)
     add_report(command)
 
@@ -139,7 +181,7 @@ def _dest(one: Input) -> str:
     return one.option if len(one.descriptions) > 1 else one.descriptions[0].name
 
 
-def _add_values(command: argparse.ArgumentParser, one: Input) -> None:
+def _add_values(command: Any, one: Input) -> None:
     """The option of an input's plain values."""
     first = one.descriptions[0]
     if len(one.descriptions) == 1:
@@ -157,22 +199,28 @@ def _add_values(command: argparse.ArgumentParser, one: Input) -> None:
     )
 
 
-def _run(kind: type[Study], options: argparse.Namespace, context: RunContext) -> None:
+def _run(kind: type[Study], name: str, options: argparse.Namespace, context: RunContext) -> None:
     from ..studies.use_case import use_case
 
     require_out(options)
+    if hasattr(options, "device"):
+        from ..fem.device import require_device
+
+        require_device(options.device)
     values: dict[str, Any] = {}
-    for name, one in kind.inputs().items():
+    for field, one in _asked(kind, name).items():
         if one.descriptions:
             given = getattr(options, _dest(one))
             if given is None and kind.from_file[0]:
                 continue
             given = one.descriptions[0].default if given is None else given
-            values[name] = one.made(tuple(given) if len(one.descriptions) > 1 else (given,), values)
+            values[field] = one.made(tuple(given) if len(one.descriptions) > 1 else (given,), values)
         elif one.kind in OBJECTS:
-            values[name] = OBJECTS[one.kind][1](options, context, one)
+            values[field] = OBJECTS[one.kind][1](options, context, one, values)
+    if kind.commands:
+        values["stages"] = _targets(kind, name)
     if kind.from_file[0]:
         study = kind.read_file(Path(options.file), (kind.name, kind.from_file[1]), values)
     else:
         study = kind(**values).complete()
-    use_case(kind.name).start(study, Path(options.out), context)
+    use_case(name).start(study, Path(options.out), context)

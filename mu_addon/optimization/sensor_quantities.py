@@ -16,9 +16,9 @@ from ..fem.bending_angle import TipSection
 from ..fem.kinematics import numbers_of
 from ..placement.deviation import centreline
 from ..sensing.embedded_waveguide import Joints, embed_waveguide
-from ..sensing.guide import Optics
 from ..sensing.light_law import Law, fit_law
 from ..sensing.light_signal import response, signal_of_nodes
+from ..sensing.optics import Optics
 from .structure import WITHOUT, Condition, States, Structure
 
 Array = np.ndarray[Any, Any]

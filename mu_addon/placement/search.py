@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Generator
 from typing import Any
 
 import attrs
@@ -80,9 +80,26 @@ def search_paths(
 ) -> Search:
     """Solve paths in the order of their predicted deviation until no other is likely to beat the best.
 
-    predicted_mm (n,): positive predictions of J_hat. check: maps numbers (k,) of paths to their exact J_hat
-    (k,) in mm, NaN for those that are impossible and left out. Raises InputError where a prediction is not
-    positive or no path is possible, and whatever `check` raises.
+    check: maps numbers (k,) of paths to their exact J_hat (k,) in mm, NaN for those that are impossible and
+    left out. Otherwise as `searching`; raises whatever `check` raises, too.
+    """
+    search = searching(predicted_mm, settings)
+    now = next(search)
+    while True:
+        try:
+            now = search.send(check(now))
+        except StopIteration as end:
+            found: Search = end.value
+            return found
+
+
+def searching(
+    predicted_mm: Array, settings: SearchSettings | None = None
+) -> Generator[Array, Array, Search]:
+    """Yield numbers (k,) of paths to solve, get their exact J_hat (k,) in mm, and return the search.
+
+    predicted_mm (n,): positive predictions of J_hat. Raises InputError where a prediction is not positive or
+    no path is possible.
     """
     s = settings or SearchSettings()
     predicted_mm = np.asarray(predicted_mm, float)
@@ -95,7 +112,7 @@ def search_paths(
     exact = np.full(len(order), np.nan)
     possible = np.ones(len(order), bool)
     while True:
-        exact[now] = check(now)
+        exact[now] = yield now
         possible[now] = np.isfinite(exact[now])
         checked = int(np.isfinite(exact).sum())
         left = order[np.isnan(exact[order]) & possible[order]]

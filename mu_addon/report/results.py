@@ -10,9 +10,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 if TYPE_CHECKING:
-    from ..sensing.guide import Optics
     from ..sensing.light_law import Law
     from ..sensing.light_signal import Response
+    from ..sensing.optics import Optics
 
 Floats = NDArray[np.floating[Any]]
 

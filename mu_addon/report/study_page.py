@@ -9,9 +9,12 @@ from typing import Any
 from ..files import write_bytes, write_text
 from ..run.execution import Execution
 from ..run.parts import Beside, Chart, Fact, Part, Pictures, Sentence, Table, flat
+from ..run.progress import spell
 from ..run.versions import package_versions
 from .html import cards, facts_table, figure, note, number, page, picture_figure, table
+from .plots import seconds as seconds_chart
 from .plots import signed
+from .stopped import NO_PICTURES
 
 _ALWAYS = {"summary.json": "all results of this run as numbers", "log.ndjson": "log of this run"}
 
@@ -26,10 +29,21 @@ def write_page(work: Execution, stopped: str = "") -> None:
 
 def page_of(work: Execution, versions: Mapping[str, str], stopped: str = "") -> str:
     """The whole report as HTML text, of all results that there are."""
-    study = work.study
-    lead = "".join(_html(work, parts) for one, parts in work.shown if not one.title)
-    sections = [(one.key, one.title, _html(work, parts)) for one, parts in work.shown if one.title]
-    sections += [
+    study, seconds = work.study, work.context.seconds
+    lead = ""
+    titles: dict[str, str] = {}
+    found: dict[str, str] = {}
+    for number, (one, parts) in enumerate(work.shown):
+        html = _html(work, parts)
+        if not one.title:
+            lead += html
+        else:
+            titles[one.key] = one.title
+            found[one.key] = found.get(one.key, "") + html
+        work.context.progress.update((number + 1) / (len(work.shown) + 1))
+    sections = [
+        *((key, titles[key], html) for key, html in found.items()),
+        ("time", "Computing time of each stage", _time(seconds) if seconds else ""),
         ("files", "Files of this run", facts_table("file", "content", _files(work))),
         ("versions", "Versions", facts_table("program", "version", versions)),
     ]
@@ -37,7 +51,24 @@ def page_of(work: Execution, versions: Mapping[str, str], stopped: str = "") -> 
         part for _, parts in work.shown for part in flat(parts) if isinstance(part, Sentence) and part.note
     ]
     notes = [*work.context.summary.get("warnings", []), *(part.text for part in listed)]
+    notes += [*_of_model(work.context.summary), *([NO_PICTURES] if work.context.hurried else [])]
     return page(study.title(), signed(study.subtitle()), note(notes, stopped), lead, sections)
+
+
+def _time(stages: Mapping[str, float]) -> str:
+    words = f"Seconds per stage; {spell(sum(stages.values()))} in all."
+    return figure(seconds_chart(stages), words, "Bar chart of seconds per stage.", "chart")
+
+
+def _of_model(summary: Mapping[str, Any]) -> list[str]:
+    """Changes that an extended model made to the unit, and those that were left out, as text."""
+    model = summary.get("model", {})
+    doubt = model.get("doubt")
+    return [
+        *([f"The extended model's {doubt}."] if doubt else []),
+        *(f"Applied from the extended model: {words}." for words in model.get("applied", ())),
+        *(f"Not applied from the extended model: {words}." for words in model.get("left_out", ())),
+    ]
 
 
 def _html(work: Execution, parts: Sequence[Part]) -> str:
@@ -62,22 +93,32 @@ def _one(work: Execution, part: Part) -> str:
         return f'<p class="answer">{words}</p>' if part.answer else f"<p>{words}</p>"
     if isinstance(part, Table):
         rows = [([*map(number, cells)], i in part.best) for i, cells in enumerate(part.rows)]
-        return table(part.caption, part.head, rows, part.groups)
+        return table(part.caption, part.head, rows, part.groups, "stack" if part.stacked else "")
     if isinstance(part, Beside):
         stacks = [one if isinstance(one, list) else [one] for one in part.parts]
-        columns = "".join(f"<div>{_html(work, stack)}</div>" for stack in stacks)
+        cells = [_html(work, stack) for stack in stacks]
+        if part.across > 3:
+            return f'<div class="many">{"".join(cells)}</div>'
+        columns = "".join(f"<div>{cell}</div>" for cell in cells)
         return f'<div class="{"pair" if part.across < 3 else "triple"}">{columns}</div>'
     # A run that was asked to stop leaves out what takes long to draw.
     if work.context.hurried:
         return ""
     if isinstance(part, Chart):
-        return figure(part.make(), escape(part.caption), part.alt or part.caption)
+        svg = part.make()
+        if part.file:
+            write_text(work.folder / part.file, svg)
+        return figure(svg, escape(part.caption), part.alt or part.caption, part.kind)
     if isinstance(part, Pictures):
         found = part.make()
         for name, picture in found:
-            write_bytes(work.folder / name, picture.png)
+            if name:
+                write_bytes(work.folder / name, picture.png)
+        if not (found and part.shown):
+            return ""
+        scale = "" if part.scale is None else _one(work, part.scale)
         shown = "".join(picture_figure(picture) for _, picture in found)
-        return f'<div class="{"pair" if len(found) < 3 else "triple"}">{shown}</div>'
+        return f'{scale}<div class="{"pair" if len(found) < 3 else "triple"}">{shown}</div>'
     return ""
 
 

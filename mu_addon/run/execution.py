@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
+import itertools
 import platform
 import time
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from concurrent.futures import FIRST_COMPLETED, Future, wait
 from contextlib import closing
 from functools import partial
@@ -26,7 +27,7 @@ from .progress import Progress
 from .progress_estimate import LOADED, LOADED_S, Plan
 from .results import Results, Task
 from .stored import content
-from .study import Dropped, Growth, Members, Section, Study
+from .study import SILENT, Dropped, Growth, Members, Section, Study
 
 
 class Execution:
@@ -38,12 +39,14 @@ class Execution:
 
     def __init__(self, study: Study, folder: Path, context: RunContext) -> None:
         self.study, self.folder, self.context = study.complete(), folder, context
+        self.study.require_possible()
         self.results = Results(self.study, folder, context.progress)
         self.lines: list[str] = []
         self.fault: MuError | None = None
         self.shown: list[tuple[Section, list[Part]]] = []
         self._stages = self.results.stages
         self._done: set[Task] = set()
+        self._grew: set[Task] = set()
         self._parts: dict[str, tuple[str, list[Part]]] = {}
         self._recorded: list[list[str]] = []
         self._warned: set[str] = set()
@@ -51,12 +54,11 @@ class Execution:
         self._written: dict[str, str] = {}
         self._shown_s = 0.0
         self._growth: dict[str, tuple[Growth, Sequence[Any]]] = {}
-        for name in self.results.members:
-            over = self._stages[name].over
-            if over and over.grows:
-                growth = over.grows(self.study)
-                self._growth[name] = growth, next(growth, ())
-                self._grow(name)
+        of = {name: self._stages[name].over for name in self.results.members}
+        self.results.growing = {name for name, over in of.items() if over and over.grows}
+        self._waiting: list[Task] = []
+        self._running: dict[Future[None], Task] = {}
+        self._begin_growth()
         for task in self.tasks:
             again = self._stages[task[0]].again
             if again and self.results.is_kept(task) and again(self.study, self.results.value(task)):
@@ -69,20 +71,36 @@ class Execution:
             (n, m) for n, members in self.results.members.items() if self._stages[n].title for m in members
         ]
 
-    def _titled(self) -> Iterator[tuple[str, list[Task]]]:
-        """Tasks by the title of their progress."""
-        for title, tasks in groupby(self.tasks, lambda task: self._stages[task[0]].title_of(task[1])):
-            yield title, list(tasks)
+    def _groups(self) -> list[tuple[str, set[str]]]:
+        """Stages in order by the title of their progress: neighbours of one title are one stage to a user.
+
+        Members of a stage whose titles differ are a group for each title.
+        """
+        titled = [
+            (self._stages[name].title_of(member) if members else self._stages[name].title, name)
+            for name, members in self.results.members.items()
+            if self._stages[name].title
+            for member in members or [None]
+        ]
+        return [(title, {name for _, name in of}) for title, of in groupby(titled, lambda one: one[0])]
+
+    def _in_group(self, task: Task, title: str, names: set[str]) -> bool:
+        """Return True if a task is of a group; one by which a set grew is of the group of its stage."""
+        stage = self._stages[task[0]]
+        return task[0] in names and (stage.title_of(task[1]) == title or task in self._grew)
 
     def plan(self) -> Plan:
         """Stages with the seconds that are left of each, by what the cache holds."""
-        found = []
-        for title, tasks in self._titled():
+        found: dict[str, float] = {}
+        for title, names in self._groups():
+            tasks = [task for task in self.tasks if self._in_group(task, title, names)]
+            if not tasks:
+                continue
             seconds = self._stages[tasks[0][0]].seconds(self.study, title)
             kept = sum(self.results.is_kept(task) for task in tasks)
             missing = 1.0 - kept / self._expected(tasks)
-            found.append((title, max(missing * seconds, min(LOADED * seconds, LOADED_S))))
-        return found
+            found.setdefault(title, max(missing * seconds, min(LOADED * seconds, LOADED_S)))
+        return [*found.items()]
 
     def _expected(self, tasks: Sequence[Task]) -> int:
         """Number of tasks of a title, with those by which their sets are expected to grow."""
@@ -93,53 +111,85 @@ class Execution:
     def run(self) -> None:
         """Make every result, and show what there is after each stage; raises the error of a stage."""
         self.show()
-        for title, tasks in self._titled():
-            with self.context.progress.stage(title):
-                self._make_all(tasks)
+        self._waiting = self.tasks
+        try:
+            with closing(Pool(self._workers, self.study.name, _begin, (self.study, self.folder))) as pool:
+                for title, names in self._groups():
+                    with self.context.progress.stage(title):
+                        self._make_all(pool, title, names)
+                    self.show()
+                    self._forget()
+        except MuError:
             self.show()
-            self._forget()
+            raise
 
-    def _make_all(self, tasks: list[Task]) -> None:
-        """Make the results of tasks, each after those that it takes, here, in processes or by a scheduler."""
-        waiting, running = list(tasks), dict[Future[None], Task]()
-        expected, before = self._expected(tasks), len(self._done)
-        parallel = any(self._stages[name].parallel for name, _ in tasks)
-        workers = self.study.processes if parallel else 1
+    @property
+    def _workers(self) -> int:
+        """Number of processes for its stages, 1 without any that may be made in others."""
+        parallel = any(self._stages[name].parallel for name in self.results.members)
+        return self.study.processes if parallel else 1
 
-        def update() -> None:
-            done = len(self._done) - before
-            self.context.progress.update(done / max(expected, done + len(waiting) + len(running)))
-            if waiting and time.monotonic() - self._shown_s > KEEP_EVERY_S:
+    def _make_all(self, pool: Pool, title: str, names: set[str]) -> None:
+        """Make the results of a group, each after those that it takes, here, in processes or by a scheduler.
+
+        Processes without work in it begin with that of later groups.
+        """
+
+        mine = {task for task in self.tasks if self._in_group(task, title, names)}
+
+        def own(tasks: Iterable[Task]) -> list[Task]:
+            return [task for task in tasks if task in mine or (task[0] in names and task in self._grew)]
+
+        def update(said: str = "") -> None:
+            done = len(own(self._done))
+            left = own([*self._waiting, *self._running.values()])
+            self.context.progress.update(done / max(self._expected(own(self.tasks)), done + len(left)), said)
+            if left and time.monotonic() - self._shown_s > KEEP_EVERY_S:
                 self.show()
 
-        one_here = workers == 1 and not (parallel and self.study.elsewhere)
-        with closing(Pool(workers, tasks[0][0], _begin, (self.study, self.folder))) as pool:
-            while waiting or running:
-                worth = self._worth(waiting, first=one_here)
-                here = next((t for t in worth if one_here or not self._is_for_pool(t)), None)
-                if here is not None:
-                    self._finish(here, waiting)
-                elif worth and self.study.elsewhere:
-                    self._make_elsewhere(worth, waiting, update)
-                    continue
-                for task in [] if here is not None else worth[: workers - len(running)]:
-                    failed, members = self.results.failed, self.results.members
-                    running[pool.submit(_in_process, task, failed, members)] = task
-                    waiting.remove(task)
-                if here is None and running:
-                    for future in wait(running, return_when=FIRST_COMPLETED).done:
-                        self._finish(running.pop(future), waiting, partial(pool.result, future))
-                elif here is None and waiting:
-                    self._give_up(waiting)
+        while (waiting := own(self._waiting)) or own(self._running.values()):
+            one_here = self._workers == 1 and not (self.study.elsewhere and self._is_parallel(waiting))
+            worth = self._worth(waiting, first=one_here)
+            here = next((t for t in worth if one_here or not self._is_for_pool(t)), None)
+            if here is not None:
+                update(self._finish(here))
+            elif worth and self.study.elsewhere:
+                self._make_elsewhere(worth, update)
+            elif self._fill(pool, worth) or self._running:
+                for future in wait(self._running, return_when=FIRST_COMPLETED).done:
+                    update(self._finish(self._running.pop(future), partial(pool.result, future)))
+            else:
+                self._give_up(waiting)
                 update()
 
-    def _make_elsewhere(self, worth: list[Task], waiting: list[Task], update: Callable[[], None]) -> None:
+    def _is_parallel(self, tasks: Sequence[Task]) -> bool:
+        return any(self._stages[name].parallel for name, _ in tasks)
+
+    def _fill(self, pool: Pool, worth: Sequence[Task]) -> bool:
+        """Give idle processes tasks, without others those of later groups; True if any was given."""
+        free = self._workers - len(self._running) if self._workers > 1 else 0
+        given = [*worth[:free]]
+        if len(given) < free:
+            # A stage that chooses its members, by their results so far, is not begun beforehand.
+            later = (t for t in self._waiting if t not in worth and not self._chooses(t))
+            ready = (t for t in later if self._is_ready(t) and self._is_for_pool(t))
+            given += itertools.islice(ready, free - len(given))
+        for task in given:
+            failed, members = self.results.failed, self.results.members
+            self._running[pool.submit(_in_process, task, failed, members)] = task
+            self._waiting.remove(task)
+        return bool(given)
+
+    def _chooses(self, task: Task) -> bool:
+        over = self._stages[task[0]].over
+        return over is not None and over.choose is not None
+
+    def _make_elsewhere(self, worth: list[Task], update: Callable[[str], None]) -> None:
         """Have the results of tasks made by the workers of the study's scheduler."""
         orders = [(self.study, task, self.results.taken_values(task), version()) for task in worth]
         with closing(Cluster(self.study.elsewhere)) as cluster:
             for number, found in cluster.results(orders, _elsewhere, self.context.progress.warning):
-                self._finish(worth[number], waiting, partial(self._receive, worth[number], found))
-                update()
+                update(self._finish(worth[number], partial(self._receive, worth[number], found)))
 
     def _receive(self, task: Task, found: Any) -> None:
         if isinstance(found, MuError):
@@ -149,14 +199,14 @@ class Execution:
     def _is_for_pool(self, task: Task) -> bool:
         return self._stages[task[0]].parallel and not self.results.is_kept(task)
 
-    def _give_up(self, waiting: list[Task]) -> None:
+    def _give_up(self, waiting: Sequence[Task]) -> None:
         """Leave members that were not chosen, and what needs them; raises TypeError if there are none."""
         if not any(self._is_ready(task) for task in waiting):
             names = ", ".join({name for name, _ in waiting})
             raise TypeError(f"stages need each other in a circle: {names}")
         self.results.failed |= dict.fromkeys(waiting, "")
         self._done.update(waiting)
-        waiting.clear()
+        self._waiting = [task for task in self._waiting if task not in waiting]
 
     def _worth(self, waiting: Sequence[Task], first: bool) -> list[Task]:
         """The tasks that can be made now, and are worth it, in order; first: the first of them suffices."""
@@ -181,21 +231,29 @@ class Execution:
 
     def _is_ready(self, task: Task) -> bool:
         """Return True if all that a task takes is made, or will not be."""
-        for name in self._stages[task[0]].needs:
+        stage = self._stages[task[0]]
+        for name in stage.needs:
+            if self.results.is_unknown(task, name):
+                return False
             for one in self.results.taken(task, name):
                 made = one in self._done if self._stages[name].title else self._is_ready(one)
                 if not made and name in self.results.members:
                     return False
         return True
 
-    def _finish(self, task: Task, waiting: list[Task], work: Callable[[], Any] | None = None) -> None:
-        """Make a task's result, by `work` if that is given; a failure that may be becomes a warning."""
-        stage = self._stages[task[0]]
+    def _finish(self, task: Task, work: Callable[[], Any] | None = None) -> str:
+        """Make a task's result, by `work` if that is given; a failure that may be becomes a warning.
+
+        Returns a few words on the result.
+        """
+        stage, said = self._stages[task[0]], ""
         try:
             if work is not None:
                 work()
+                self.results.catch_up(self.results.failed, self.results.members)
             if not self.results.is_kept(task):
                 self.results.value(task)
+            said = stage.says(self.results.value(task)) if stage.says is not SILENT else ""
         except Dropped:
             self.results.failed[task] = ""
         except (OutputError, WorkerDiedError):
@@ -208,12 +266,39 @@ class Execution:
             self.results.failed[task] = f"{words}: {error.what}{where}."
             self._tell(self.results.failed[task])
         self._done.add(task)
-        if task in waiting:
-            waiting.remove(task)
-        waiting += self._grow(task[0])
+        if task in self._waiting:
+            self._waiting.remove(task)
+        if task[0] in self._growth:
+            self._grow(task[0])
+        self._begin_growth()
+        return said
 
-    def _grow(self, name: str) -> list[Task]:
-        """Tasks of the members by which a set grows now, that its growth asks for (`Over.grows`)."""
+    def _begin_growth(self) -> None:
+        """Begin the growth of the sets for which all is known that they take."""
+        for name in [*self.results.growing - self._growth.keys()]:
+            over = self._stages[name].over
+            assert over is not None
+            assert over.grows is not None
+            needed = [task for one in over.after for task in self._tasks_of(one)]
+            if not all(self._is_made(task) for task in needed):
+                continue
+            try:
+                growth = over.grows(self.study, *(self.results.value((one, None)) for one in over.after))
+                self._growth[name] = growth, next(growth)
+            except (StopIteration, Dropped):
+                self.results.growing.discard(name)
+            else:
+                self._grow(name)
+
+    def _tasks_of(self, name: str) -> list[Task]:
+        return [(name, member) for member in self.results.members.get(name, [])]
+
+    def _is_made(self, task: Task) -> bool:
+        """Return True if a task's result is there, or can be made in memory now, or will never be."""
+        return task in self._done if self._stages[task[0]].title else self._is_ready(task)
+
+    def _grow(self, name: str) -> None:
+        """Add the members by which a set grows now, that its growth asks for (`Over.grows`)."""
         new: list[Any] = []
         while name in self._growth:
             growth, asked = self._growth[name]
@@ -225,23 +310,20 @@ class Execution:
                 self._growth[name] = growth, growth.send(results)
             except (StopIteration, Dropped):
                 del self._growth[name]
-        self.results.grow(name, new) if new else None
-        return [(name, member) for member in new]
+                self.results.growing.discard(name)
+        if new:
+            self.results.grow(name, new)
+            self._grew.update((name, member) for member in new)
+            self._waiting += [(name, member) for member in new]
+        if name not in self.results.growing:
+            self._begin_growth()
 
     def _forget(self) -> None:
         """Release results that no task to come takes: a factor, a field of displacements."""
         needed: set[Task] = set()
-        asked = [task for task in self.tasks if task not in self._done]
-        while asked:
-            taken = [
-                t
-                for task in asked
-                for name in self._stages[task[0]].needs
-                for t in self.results.taken(task, name)
-            ]
-            needed.update(taken)
-            # A kept result that is not there any more is read again.
-            asked = [task for task in set(taken) if not self._stages[task[0]].title]
+        for task in self.tasks:
+            if task not in self._done:
+                needed.update(self.results.all_taken(task))
         self.results.forget(needed.__contains__)
 
     def _tell(self, text: str, where: str = "", remedy: str = "") -> None:
@@ -269,7 +351,12 @@ class Execution:
         summary.pop("warnings", None)
         summary |= {"warnings": texts} if texts else {}
         self.fault = next((part.error for part in every if isinstance(part, Fault)), None)
-        self.lines = [part.text for part in every if isinstance(part, Sentence) and part.terminal]
+        sentences = [part for part in every if isinstance(part, Sentence)]
+        self.lines = [part.text for part in sentences if part.terminal]
+        for part in sentences:
+            if part.found and part.text not in self._warned:
+                self._warned.add(part.text)
+                self.context.progress.finding(part.text)
         self.shown, self._shown_s = shown, time.monotonic()
 
     def _section(self, one: Section) -> list[Part]:
@@ -333,6 +420,8 @@ def _in_process(task: Task, failed: dict[Task, str], members: dict[str, list[Any
     """
     (results,) = _HERE
     results.catch_up(failed, members)
+    # A process may have made a model for another stage: two would take twice the memory.
+    results.forget(set(results.all_taken(task)).__contains__)
     results.value(task)
 
 

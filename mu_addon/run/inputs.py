@@ -38,18 +38,20 @@ def read_toml(path: Path, what: str = "inputs", remedy: str = "choose another fo
     return parse_toml(text, where)
 
 
-def read_inputs(path: Path, *words: str) -> tuple[dict[str, Any], dict[str, Any]]:
+def read_inputs(path: Path, *words: str, version: int = FORMAT) -> tuple[dict[str, Any], dict[str, Any]]:
     """Content of a file of inputs, and its table `[run]` of keys that decide no result. Raises InputError.
 
-    A file without `format`, as older versions wrote some, is of format 1. words: as those of `read_toml`.
+    A file without `format`, as older versions wrote some, is of format 1. words: as those of `read_toml`;
+    version: the format's number.
     """
     document = read_toml(path, *words)
     found = document.pop("format", FORMAT)
-    if found != FORMAT or isinstance(found, bool):
+    if found != version or isinstance(found, bool):
+        newer = isinstance(found, int) and not isinstance(found, bool) and found > version
         raise InputError(
-            f"{path.name} is of format {found!r}, and this version reads {FORMAT}",
+            f"{path.name} is of format {found!r}, and this version reads {version}",
             str(path),
-            "use the newer version that wrote it",
+            "use the newer version that wrote it" if newer else "start it again in another folder",
         )
     run = document.pop(RUN, {})
     if not isinstance(run, dict):

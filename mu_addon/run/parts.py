@@ -39,7 +39,8 @@ def recorded(key: str, value: Any) -> Fact:
 class Sentence:
     """A sentence; answer: it answers the study's question; terminal: it is printed at the end of a command.
 
-    page: it stands in the report, with `note` in the box at its head; strong: words of it to be set off.
+    page: it stands in the report, with `note` in the box at its head; strong: words of it to be set off;
+    found: a first finding, told as soon as it is there.
     """
 
     text: str
@@ -48,6 +49,7 @@ class Sentence:
     page: bool = True
     note: bool = False
     strong: str = ""
+    found: bool = False
 
 
 @attrs.frozen
@@ -55,7 +57,7 @@ class Table:
     """A table of texts.
 
     head: title of each column, with "n" for numbers, "text" for long texts, "line" for texts of one line;
-    best: rows to mark; groups: titles over so many columns each.
+    best: rows to mark; groups: titles over so many columns each; stacked: a phone shows each row as a block.
     """
 
     caption: str
@@ -63,6 +65,7 @@ class Table:
     rows: Sequence[Sequence[Any]]
     best: Sequence[int] = ()
     groups: Sequence[tuple[str, int]] = ()
+    stacked: bool = False
 
 
 @attrs.frozen
@@ -85,23 +88,31 @@ def csv(name: str, columns: Sequence[str], rows: Sequence[Sequence[Any]]) -> Fil
 
 @attrs.frozen
 class Chart:
-    """A chart; make: its SVG text."""
+    """A chart; make: its SVG text; file: that it is, too; kind: "bar" for a scale, "best" to set it off."""
 
     make: Callable[[], str]
     caption: str
     alt: str = ""
+    file: str = ""
+    kind: str = ""
 
 
 @attrs.frozen
 class Pictures:
-    """Pictures side by side, each also a file of the folder; make: file name and picture of each."""
+    """Pictures side by side, each also a file of the folder, if it has a name; make: name and picture of each.
+
+    shown: False of files that no page shows. scale: of the pictures' colours, above them, of which `make` is
+    called first.
+    """
 
     make: Callable[[], Sequence[tuple[str, Any]]]
+    shown: bool = True
+    scale: Chart | None = None
 
 
 @attrs.frozen
 class Beside:
-    """Columns side by side, each a part or a list of parts; across: 2 or 3 in a row of the page."""
+    """Columns side by side, each a part or a list of parts; across: 2, 3 or more in a row of the page."""
 
     parts: Sequence[Any]
     across: int = 2

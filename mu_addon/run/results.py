@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -13,7 +13,7 @@ from ..errors import InputError
 from .cache import Cache, key
 from .progress import Progress
 from .stored import content, packed, unpacked
-from .study import TELL, Dropped, Members, Study, Tell, parameters_of
+from .study import TELL, Dropped, Members, Stage, Study, Tell, parameters_of
 
 Task = tuple[str, Any]
 """A stage's name and a member of its set, None of a stage without one."""
@@ -25,16 +25,20 @@ class Results:
     """Inputs, derived values and results of a study: made, or read from the cache, when they are asked for.
 
     members: of each stage that the study wants; failed: tasks that have no result, with the reason, "" of one
-    that was dropped.
+    that was dropped; growing: names of stages whose sets are not whole yet.
     """
 
     def __init__(self, study: Study, folder: Path, progress: Progress) -> None:
         self.study, self.folder, self.progress = study, folder, progress
         self.cache = Cache(folder / "cache")
-        self.stages = study.stages()
+        self.stages = study.all_stages()
         wanted = {name: one for name, one in self.stages.items() if one.wanted(study)}
+        # What cannot do without a stage that is not wanted is not wanted either.
+        while without := [n for n, one in wanted.items() if any(self._lacks(one, p, wanted) for p in one.needs)]:
+            wanted = {name: one for name, one in wanted.items() if name not in without}
         self.members = {n: list(s.over.members(study)) if s.over else [None] for n, s in wanted.items()}
         self.failed: dict[Task, str] = {}
+        self.growing: set[str] = set()
         self._given: dict[str, Any] = {name: getattr(study, name) for name in study.inputs()}
         self._contents: dict[str, str] = {}
         self._values: dict[Task, Any] = {}
@@ -42,11 +46,18 @@ class Results:
         # Known to have no result so far: asked again once something was made.
         self._missing: set[Task] = set()
 
+    def _lacks(self, one: Stage, name: str, wanted: Mapping[str, Stage]) -> bool:
+        return name in self.stages and name not in wanted and not one.may_lack(name)
+
     def given(self, name: str) -> Any:
-        """An input, or a value derived from inputs; made once."""
+        """An input, or a value derived from inputs, by a method or a property; made once."""
         if name not in self._given:
-            method = self.study.derived()[name]
-            self._given[name] = method(self.study, **{p: self.given(p) for p in parameters_of(method)})
+            method = self.study.derived().get(name)
+            self._given[name] = (
+                method(self.study, **{p: self.given(p) for p in parameters_of(method)})
+                if method
+                else getattr(self.study, name)
+            )
         return self._given[name]
 
     def taken(self, task: Task, name: str) -> list[Task]:
@@ -55,6 +66,21 @@ class Results:
             return []
         wanted = self._wanted(task, name)
         return [(name, one) for one in (wanted if isinstance(wanted, list) else [wanted])]
+
+    def all_taken(self, task: Task) -> Iterator[Task]:
+        """The tasks of which a task takes the results, and those that these are made of in memory."""
+        for name in self.stages[task[0]].needs:
+            for one in self.taken(task, name):
+                yield one
+                # A kept result that is not there any more is read again.
+                if not self.stages[one[0]].title:
+                    yield from self.all_taken(one)
+
+    def is_unknown(self, task: Task, name: str) -> bool:
+        """Return True if a task takes, by one of its parameters, a whole set that still grows."""
+        over = self.stages[task[0]].over
+        chosen = over is not None and name in over.needs(self.study, task[1])
+        return name in self.growing and name != task[0] and not chosen
 
     def _wanted(self, task: Task, name: str) -> Any:
         """What a task takes of another stage: a member, or a list of members."""
@@ -123,6 +149,8 @@ class Results:
         if stage.title and not stage.kept:
             return task in self._values
         if not stage.kept:
+            if any(self.is_unknown(task, name) for name in stage.needs):
+                return False
             every = [one for name in stage.needs for one in self.taken(task, name)]
             if not all(self.is_out(one) or self.is_there(one) for one in every):
                 return False

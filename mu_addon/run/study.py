@@ -32,10 +32,10 @@ from typing import TYPE_CHECKING, Any, ClassVar, Self
 
 import attrs
 
-from ..errors import InputError
-from ..reading import parse_toml
+from ..errors import InputError, did_you_mean
+from ..reading import file_bytes, parse_toml
 from .folder import RUN, FolderLayout
-from .inputs import FORMAT, read_inputs, structured
+from .inputs import FORMAT, digest, read_inputs, structured
 
 if TYPE_CHECKING:
     from .progress import Progress
@@ -43,6 +43,8 @@ if TYPE_CHECKING:
 _INPUT, _STAGE, _DERIVED, _SECTION = "input", "_stage", "_derived", "_section"
 _NONE: Mapping[str, Any] = MappingProxyType({})
 TELL = "tell"
+TARGETS = "stages"
+"""Key of the table [run] for the targets of this run, where the folder has further ones."""
 REPORT_S = 5.0
 """Expected seconds of a report on two cores."""
 """Parameter by which a stage reports its progress: see `Tell`."""
@@ -65,7 +67,8 @@ class Input:
     faces ask for it in their own way. decides: False for one that decides no figure, such as a number of
     processes: it is in no key, and in the table [run] of the inputs' file. option: its name in a command, if
     it is not that of the description; metavar: stands for its value there; many: it takes several words, or
-    so many; alone: its value where the option stands without one; path: "file" or "folder" if it names one.
+    so many; alone: its value where the option stands without one; path: "file" or "folder" if it names one;
+    group: title over its option in help; target: the first of a study's targets that has it.
     An input of another kind overrides `made`, `write` and `read`.
     """
 
@@ -77,6 +80,8 @@ class Input:
     many: bool | int = False
     alone: str = ""
     path: str = ""
+    group: str = ""
+    target: str = ""
 
     def made(self, values: tuple[Any, ...], given: Mapping[str, Any]) -> Any:
         """The input of its plain values; given: the inputs before it. Raises InputError."""
@@ -148,9 +153,12 @@ class Found:
     replaced: tuple[str, ...] = ()
 
 
-def setting(description: Any, *, metavar: str | None = None, decides: bool = True) -> Any:
-    """attrs field of an input that is a plain value, of the description's name, default and bounds."""
-    given = Input("setting", (description,), decides, metavar=metavar)
+def setting(description: Any, **more: Any) -> Any:
+    """attrs field of an input that is a plain value, of the description's name, default and bounds.
+
+    more: of the `Input`.
+    """
+    given = Input("setting", (description,), **more)
     return attrs.field(
         default=description.default, converter=description.checked, metadata={_INPUT: given}, kw_only=True
     )
@@ -166,12 +174,13 @@ Growth = Generator[Sequence[Any], Sequence[Any], Any]
 
 def grown(growth: Growth, results: Mapping[Any, Any]) -> Any:
     """The value of a set's growth (`Over.grows`) with these results by member."""
-    asked = next(growth)
-    while True:
-        try:
+    asked: Sequence[Any] = ()
+    try:
+        asked = next(growth)
+        while True:
             asked = growth.send([results[member] for member in asked])
-        except StopIteration as end:
-            return end.value
+    except StopIteration as end:
+        return end.value
 
 
 @attrs.frozen
@@ -184,7 +193,8 @@ class Over:
     stage's set that it takes; a parameter that is not there takes the whole set. A stage that names itself
     takes earlier members. grows: of a study, a generator that yields members, new ones among them, and is
     sent their results once all are made; one without a result ends it. Its value is that of `grown`. most:
-    the expected number of members of a set that grows. choose: of the members that could be made now, those
+    the expected number of members of a set that grows; after: names of stages whose results `grows` takes
+    after the study, once they are made. choose: of the members that could be made now, those
     that are worth it, the first one first, from the results so far; what is never chosen has no result.
     """
 
@@ -192,8 +202,9 @@ class Over:
     members: Callable[[Any], Sequence[Any]]
     needs: Callable[[Any, Any], Mapping[str, Any]] = lambda study, member: {}
     gives: Callable[[Any, Any], Mapping[str, Any]] | None = None
-    grows: Callable[[Any], Growth] | None = None
+    grows: Callable[..., Growth] | None = None
     most: Callable[[Any], int] = lambda study: 0
+    after: tuple[str, ...] = ()
     choose: Callable[[Any, Sequence[Any], Members], Sequence[Any]] | None = None
 
 
@@ -212,6 +223,7 @@ class Stage:
     failing: str
     parallel: bool
     again: Callable[[Any, Any], bool] | None
+    says: Callable[[Any], str]
 
     @property
     def needs(self) -> tuple[str, ...]:
@@ -246,6 +258,11 @@ class Stage:
         return typing.get_type_hints(self.method)["return"]
 
 
+def SILENT(found: Any) -> str:
+    """No words on a result."""
+    return ""
+
+
 def stage(
     title: str,
     seconds: float | Mapping[str, float] | Callable[[Any], float] = 0.1,
@@ -257,6 +274,7 @@ def stage(
     revision: int = 1,
     parallel: bool = False,
     again: Callable[[Any, Any], bool] | None = None,
+    says: Callable[[Any], str] = SILENT,
 ) -> Callable[[Any], Any]:
     """A method that makes one result, or one for each member of a set; its `self` is None.
 
@@ -266,9 +284,9 @@ def stage(
     that the method declares, of arrays, numbers, texts and attrs classes of these; else it is made in
     each run. failing: words for a warning; an error of the stage then does not end the run, and what
     needs it is left out. revision: raise it when a change of the code changes the result. parallel:
-    members may be made in processes of their own, the study's `workers`, side by side with other parallel
-    stages of the same title, or by the workers of its `scheduler`. again: True of a study and a result that
-    an earlier run kept and this one makes anew.
+    members may be made in processes of their own, the study's `workers`, side by side with all other parallel
+    stages, the first ones first, or by the workers of its `scheduler`. again: True of a study and a result
+    that an earlier run kept and this one makes anew. says: a few words on a result, for its progress.
     """
 
     if parallel and not kept:
@@ -294,6 +312,7 @@ def stage(
                 failing,
                 parallel,
                 again,
+                says,
             ),
         )
         return method
@@ -301,9 +320,11 @@ def stage(
     return mark
 
 
-def intermediate(over: Over | None = None) -> Callable[[Any], Any]:
+def intermediate(
+    over: Over | None = None, wanted: Callable[[Any], bool] = lambda study: True
+) -> Callable[[Any], Any]:
     """A method that makes something in memory, such as a model, whenever a stage takes it; it is not kept."""
-    return stage("", kept=False, over=over)
+    return stage("", kept=False, over=over, wanted=wanted)
 
 
 def derived(method: Any) -> Any:
@@ -319,6 +340,7 @@ class Section:
     key: str
     title: str
     method: Callable[..., Iterator[Any]]
+    order: int = 0
 
     @property
     def parameters(self) -> dict[str, bool]:
@@ -326,15 +348,16 @@ class Section:
         return parameters_of(self.method)
 
 
-def section(key: str = "", title: str = "") -> Callable[[Any], Any]:
+def section(key: str = "", title: str = "", order: int = 0) -> Callable[[Any], Any]:
     """A method that yields parts; its parameters name what it shows, None by default where it may lack.
 
-    key, title: of the report's section; without, it leads. It is called whenever one of them is new, so it
+    key, title: of the report's section; without, it leads. Sections of one key are one. order: sections of a
+    lower number come first, those of one as they are declared. It is called whenever one of them is new, so it
     takes milliseconds.
     """
 
     def mark(method: Any) -> Any:
-        setattr(method, _SECTION, Section(key, title, method))
+        setattr(method, _SECTION, Section(key, title, method, order))
         return method
 
     return mark
@@ -397,6 +420,11 @@ class Study:
     whose options replace values in it: help on the file, and what to do where it cannot be read. files:
     content of each file of the run's folder, by name or pattern; to_fill: files that are filled in by hand,
     which no run removes. example: a command line. node: None of a study that is no node.
+
+    commands: of a study of several, its targets, each with help and example by its name, in order of need. They
+    share a folder: each has the inputs and stages of those before it, and a table of its own in the file of
+    inputs; what a further one made stays valid. file: the name of that file, if it is not the study's;
+    version: the number of its format; header: its first line.
     """
 
     name: ClassVar[str]
@@ -405,6 +433,15 @@ class Study:
     from_file: ClassVar[tuple[str, str]] = ("", "")
     example: ClassVar[str] = ""
     node: ClassVar[Node | None] = None
+    commands: ClassVar[Mapping[str, tuple[str, str]]] = _NONE
+    file: ClassVar[str] = ""
+    version: ClassVar[int] = FORMAT
+    header: ClassVar[str] = ""
+
+    @property
+    def wanted_targets(self) -> tuple[str, ...]:
+        """Its targets up to the one that it is run for: its input `stages`; "" alone for a study without."""
+        return tuple(getattr(self, "stages", ("",))) if self.commands else ("",)
 
     @property
     def processes(self) -> int:
@@ -433,14 +470,14 @@ class Study:
         return {f.name: f.metadata[_INPUT] for f in fields if _INPUT in f.metadata}
 
     @classmethod
-    def stages(cls) -> dict[str, Stage]:
+    def all_stages(cls) -> dict[str, Stage]:
         """Its stages by name, each after those that it needs."""
         return _marked(cls, _STAGE)
 
     @classmethod
     def sections(cls) -> list[Section]:
         """Its sections in order."""
-        return list(_marked(cls, _SECTION).values())
+        return sorted(_marked(cls, _SECTION).values(), key=lambda one: one.order)
 
     @classmethod
     def derived(cls) -> dict[str, Any]:
@@ -452,14 +489,27 @@ class Study:
         """The files of its folder."""
         optional = tuple(file for name, one in cls.inputs().items() for file in one.file_names(name))
         results = (*cls.files, "report.html")
-        return FolderLayout(f"{cls.name}.toml", f"# Inputs of `{cls.name}`.", results, optional, cls.to_fill)
+        header = cls.header or f"# Inputs of `{cls.name}`."
+        return FolderLayout(f"{cls.file or cls.name}.toml", header, results, optional, cls.to_fill)
 
     # What its inputs decide, before a run.
+
+    def require_possible(self) -> None:
+        """Raise InputError for what its stages would find out late."""
+
+    @property
+    def report_s(self) -> float:
+        """Expected seconds of its report on two cores."""
+        return REPORT_S
+
+    def bytes_needed(self) -> int:
+        """Room that a run takes on the disk at most."""
+        return 0
 
     def expected(self) -> dict[str, float]:
         """Seconds of each stage on two cores by the title of its progress, in order."""
         found: dict[str, float] = {}
-        for one in self.stages().values():
+        for one in self.all_stages().values():
             if not (one.title and one.wanted(self)):
                 continue
             members = [None] if one.over is None or one.over.grows else one.over.members(self)
@@ -483,18 +533,96 @@ class Study:
 
     def texts(self) -> dict[str, str]:
         """Text of every file of inputs, by name."""
-        from ..toml_writer import toml_text
+        tables, run, files = self._written()
+        return {self.layout().inputs: self._text(tables, run), **files}
 
-        layout = self.layout()
+    @property
+    def tables(self) -> dict[str, dict[str, Any]]:
+        """Keys of the file of inputs that decide results, by target."""
+        return self._written()[0]
+
+    def _written(self) -> tuple[dict[str, dict[str, Any]], dict[str, Any], dict[str, str]]:
+        """Keys by target, the table [run], and the texts of the other files by name."""
+        tables: dict[str, dict[str, Any]] = {target: {} for target in self.wanted_targets}
         run: dict[str, Any] = {}
-        values: dict[str, Any] = {"format": FORMAT}
         files: dict[str, str] = {}
         for name, one in self.inputs().items():
+            if one.target not in tables:
+                continue
             written = one.write(name, getattr(self, name))
-            values |= written.keys
+            tables[one.target] |= written.keys
+            if self.commands:
+                # So that a table says what its target depends on, and a file that was edited is noticed.
+                tables[one.target] |= {f"{name}_sha256": digest(t) for t in written.files.values()}
             run |= written.run
             files |= written.files
-        return {layout.inputs: toml_text(values | ({RUN: run} if run else {}), layout.header), **files}
+        return tables, run, files
+
+    @classmethod
+    def _text(cls, tables: Mapping[str, Mapping[str, Any]], run: Mapping[str, Any]) -> str:
+        from ..toml_writer import toml_text
+
+        own = tables if cls.commands else tables[""]
+        return toml_text({"format": cls.version, **own, **({RUN: run} if run else {})}, cls.layout().header)
+
+    def texts_in(self, folder: Path, asked: bool = False) -> tuple[dict[str, str], tuple[str, ...]]:
+        """Texts for a folder, with inputs of further targets there that are still valid, and those targets.
+
+        Without further targets, as `texts`. asked: the table [run] names the targets of this study. Raises
+        InputError for a file of inputs that cannot be used.
+        """
+        tables, run, files = self._written()
+        path = folder / self.layout().inputs
+        if not self.commands or not path.is_file():
+            return self.texts(), ()
+        old, _, _ = self.read_tables(path)
+        further = tuple(target for target in self.commands if target in old and target not in tables)
+        same = all(old[target] == tables[target] for target in tables if target in old)
+        more = self._named_files(path, {target: old[target] for target in further}) if same else None
+        if not further or more is None:
+            return self.texts(), ()
+        merged = tables | {target: old[target] for target in further}
+        run |= {TARGETS: list(tables)} if asked else {}
+        return {self.layout().inputs: self._text(merged, run), **files, **more}, further
+
+    @classmethod
+    def read_tables(
+        cls, path: Path, *words: str
+    ) -> tuple[dict[str, dict[str, Any]], dict[str, Any], tuple[str, ...]]:
+        """Keys of a file of inputs by target, its table [run], and the targets that it is run for.
+
+        words: as those of `read_inputs`. Raises InputError.
+        """
+        keys, run = read_inputs(path, *words, version=cls.version)
+        if not cls.commands:
+            return {"": keys}, run, ("",)
+        known = [*cls.commands][: len(keys)]
+        if set(keys) != set(known) or not known:
+            raise InputError(
+                f"the tables [{'], ['.join(map(str, keys))}] are not those of a {cls.file}",
+                str(path),
+                f"the tables are [{'], ['.join(cls.commands)}], each with those before it",
+            )
+        for target in known:
+            if not isinstance(keys[target], dict):
+                raise InputError(f"{target} is not a table", str(path), f"write it as [{target}]")
+        asked = run.pop(TARGETS, known)
+        return keys, run, tuple(target for target in known if target in asked)
+
+    @classmethod
+    def _named_files(cls, path: Path, tables: Mapping[str, Mapping[str, Any]]) -> dict[str, str] | None:
+        """Texts of the files that tables name, by name; None where one is not as it was."""
+        found = {}
+        for name, one in cls.inputs().items():
+            sha256 = tables.get(one.target, {}).get(f"{name}_sha256")
+            for file in one.file_names(name) if sha256 else ():
+                try:
+                    found[file] = file_bytes(path.parent / file).decode("utf-8")
+                except (OSError, UnicodeDecodeError):
+                    return None
+                if digest(found[file]) != sha256:
+                    return None
+        return found
 
     @classmethod
     def read(cls, folder: Path) -> Self:
@@ -509,21 +637,64 @@ class Study:
         """
         from ..toml_writer import toml_text
 
-        keys, run = read_inputs(path, *words)
+        tables, run, targets = cls.read_tables(path, *words)
+        if cls.commands and cls._named_files(path, tables) is None:
+            raise InputError(
+                "an input file has changed since this study was made",
+                str(path.parent),
+                "restore it, or start a new study with it in another folder",
+            )
         for name, value in replaced.items():
-            keys |= parse_toml(toml_text(cls.inputs()[name].write(name, value).keys, ""), name)
-        found = Found(path, keys, run, replaced=tuple(replaced))
-        special = {}
-        for name, one in cls.inputs().items():
-            if one.kind != "setting":
-                special[name] = found.given[name] = one.read(name, found)
-                continue
-            if not one.decides and name in run:
-                keys[name] = run[name]
-            found.given[name] = keys.get(name, one.descriptions[0].default)
-        study = structured(cls, keys, str(path), **special).complete()
-        for name in found.before:
-            study._read()[name].require(name, getattr(study, name), found)
+            one = cls.inputs()[name]
+            tables[one.target] |= parse_toml(toml_text(one.write(name, value).keys, ""), name)
+        return cls.of_tables({target: tables[target] for target in targets}, path, run, tuple(replaced))
+
+    @classmethod
+    def of_tables(
+        cls,
+        tables: Mapping[str, Mapping[str, Any]],
+        path: Path,
+        run: Mapping[str, Any] = _NONE,
+        replaced: tuple[str, ...] = (),
+        **given: Any,
+    ) -> Self:
+        """The study of the keys of a file of inputs by target; see `Found`, whose path this is.
+
+        given: inputs in place of what tables say of them. Raises InputError.
+        """
+        made: dict[str, Any] = {"stages": tuple(tables)} | given if cls.commands else dict(given)
+        kept = dict(run)
+        before: dict[str, Any] = {}
+        plain: dict[str, Any] = {}
+        for target, table in tables.items():
+            where = f"{path}, [{target}]" if target else str(path)
+            found = Found(path, dict(table), kept, made, before, replaced)
+            for name, one in cls.inputs().items():
+                if one.target != target or name in given:
+                    continue
+                if one.kind != "setting":
+                    made[name] = one.read(name, found)
+                    continue
+                if not one.decides and name in kept:
+                    found.keys[name] = kept[name]
+                if name in found.keys:
+                    plain[name] = found.keys.pop(name)
+                made[name] = plain.get(name, one.descriptions[0].default)
+            left = {k: v for k, v in found.keys.items() if not (cls.commands and k.endswith("_sha256"))}
+            if cls.commands and left:
+                own = [n for n, one in cls.inputs().items() if one.target == target and one.decides]
+                unknown = next(iter(left))
+                raise InputError(
+                    f"unknown key {unknown!r}{did_you_mean(unknown, own)}",
+                    where,
+                    f"known: {', '.join(own)}",
+                )
+            plain |= left
+        settings = [name for name, one in cls.inputs().items() if one.kind == "setting"]
+        special = {name: value for name, value in made.items() if name in given or name not in settings}
+        study = structured(cls, plain, str(path), **special).complete()
+        for name in before:
+            study._read()[name].require(name, getattr(study, name), Found(path, {}, kept, {}, before))
         return study
 
     def complete(self) -> Self:

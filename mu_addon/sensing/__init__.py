@@ -30,13 +30,13 @@ if TYPE_CHECKING:
     from .framing import crc16 as crc16
     from .guide import Centreline as Centreline
     from .guide import Guide as Guide
-    from .guide import Optics as Optics
     from .light_law import Law as Law
     from .light_law import fit_law as fit_law
     from .light_signal import Response as Response
     from .light_signal import Signal as Signal
     from .light_signal import signal_of_nodes as signal_of_nodes
     from .light_signal import signal_of_states as signal_of_states
+    from .optics import Optics as Optics
     from .reconnecting import Control as Control
     from .recording import Recorder as Recorder
     from .recording import Recording as Recording

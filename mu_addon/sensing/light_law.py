@@ -21,8 +21,9 @@ from ..design.dimensions import Dimensions
 from ..design.waveguide import STRUT_GAP
 from ..errors import InputError
 from .embedded_waveguide import WaveguideShape
-from .guide import Centreline, Optics, swept
+from .guide import Centreline, swept
 from .notched import well_angles, with_wells
+from .optics import Optics
 from .tracing import Light, lambertian, trace
 
 Array = np.ndarray[Any, Any]

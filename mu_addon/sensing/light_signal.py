@@ -19,8 +19,8 @@ from ..design.waveguide import waveguide
 from ..errors import InputError
 from ..meshing.mesh import Mesh
 from .embedded_waveguide import EmbeddedWaveguide, Joints, embed_waveguide
-from .guide import Optics
 from .light_law import Law, features, fit_law, traced
+from .optics import Optics
 
 Array = np.ndarray[Any, Any]
 

@@ -13,7 +13,8 @@ import attrs
 import numpy as np
 import warp as wp
 
-from .guide import Guide, Optics
+from .guide import Guide
+from .optics import Optics
 from .ray_kernel import ABSORBED, DETECTED, FATES, trace_rays
 
 Array = np.ndarray[Any, Any]

@@ -11,6 +11,7 @@ STUDIES = {
     "calibrate": "Calibrate",
     "chain": "Chain",
     "check": "Check",
+    "design": "UnitStudy",
     "design-experiments": "DesignExperiments",
     "export": "Export",
     "fit-material": "FitMaterial",
@@ -18,14 +19,18 @@ STUDIES = {
     "homogenize": "Homogenize",
     "measure": "Measure",
     "optimize": "Optimize",
+    "place": "UnitStudy",
+    "simulate": "UnitStudy",
     "specimens": "Specimens",
     "sweep": "Sweep",
 }
-"""Class by name: of its command, its node and its module."""
+"""Class by name of its command; its module has the same name, unless it has several commands."""
+_MODULES = dict.fromkeys(("design", "simulate", "place"), "unit_ranking")
 
 
 @cache
 def study(name: str) -> type[Study]:
     """The study of a command."""
-    found: type[Study] = getattr(import_module(f".{name.replace('-', '_')}", __name__), STUDIES[name])
+    module = _MODULES.get(name, name.replace("-", "_"))
+    found: type[Study] = getattr(import_module(f".{module}", __name__), STUDIES[name])
     return found

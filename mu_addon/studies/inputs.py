@@ -32,11 +32,15 @@ def asked(
 
 @attrs.frozen
 class UnitInput(Input):
-    """A unit, in a file of its own; needed: there is always one; default: the preset where none is given."""
+    """A unit, in a file of its own; needed: there is always one; default: the preset where none is given.
+
+    modelled: a command takes an extended model's parameters into it, and none of its other effects.
+    """
 
     kind: str = "unit"
     needed: bool = True
     default: str = ""
+    modelled: bool = True
 
     def write(self, name: str, value: design.Unit | None) -> Written:
         """The file's name, and its text."""

@@ -42,7 +42,7 @@ class PlanInput(Input):
 
     def write(self, name: str, value: parameter_study.Plan) -> Written:
         """Its keys. The numbers of points decide nothing, since more may be added to those that are there."""
-        from ..usecases.simulate_and_place.job import protocol_text
+        from .unit_inputs import protocol_text
 
         texts = {UNIT: design.to_toml(value.inputs.unit), PROTOCOL: protocol_text(value.inputs.protocol)}
         run = {"points": list(value.counts), "files": str(value.folder.resolve())}
@@ -68,12 +68,10 @@ class PlanInput(Input):
 
 
 def _expected_s(study: Sweep) -> float:
-    from ..usecases.simulate_and_place.expected import plan_of
-
     # Some of many points tell enough.
     numbers = range(1, study.plan.size + 1)[:: -(-study.plan.size // SAMPLED)]
     jobs = [study.plan.point(number).job for number in numbers]
-    seconds = [BEGIN_S + sum(s for _, s in plan_of(job)[:-1]) for job in jobs if job is not None]
+    seconds = [BEGIN_S + sum(job.expected().values()) for job in jobs if job is not None]
     return study.plan.size / len(numbers) * sum(seconds) / min(max(study.workers, 1), 2)
 
 

@@ -4,12 +4,17 @@ from __future__ import annotations
 
 from functools import cache
 from pathlib import Path
+from typing import Any
 
 from ..run.context import RunContext
 from ..run.execution import Execution
+from ..run.folder import begin, claim, keep_inputs, require_space
+from ..run.lock import FolderLock
 from ..run.progress_estimate import Plan
-from ..run.study import REPORT_S, Study
+from ..run.study import Study
+from ..run.summary import SUMMARY, read_summary
 from ..run.usecase import UseCase
+from ..run.versions import package_versions
 from . import study
 
 
@@ -23,17 +28,64 @@ def use_case(name: str) -> UseCase[Study]:
         kind.read,
         run,
         console_summary=lambda summary: [],
-        plan=lambda study: [*study.expected().items(), ("report", REPORT_S)],
+        begin=begin_study,
+        plan=lambda study: [*study.expected().items(), ("report", study.report_s)],
         plan_in=plan,
     )
 
 
+def begin_study(job: Study, folder: Path, context: RunContext) -> None:
+    """Make a folder a study's; figures there of further targets of the same inputs stay in the summary.
+
+    Raises InputError, also where another process works in the folder, and OutputError.
+    """
+    context.lock_folder(folder)
+    job = job.complete()
+    texts, further = job.texts_in(folder)
+    if further:
+        # Further targets of the same inputs make the file of inputs longer, and nothing stale.
+        keep_inputs(folder, texts, job.layout().inputs)
+        context.summary = _earlier(folder) | context.summary
+    begin(context, folder, job.layout(), texts)
+    require_space(folder, job.bytes_needed())
+
+
+def write_study(job: Study, folder: Path) -> None:
+    """Write a study's inputs into its folder, for another process to `resume` it; results there stay.
+
+    Of further targets of the same inputs, too: the table [run] then names those of this run. Raises
+    InputError, also where another process works in the folder, and OutputError.
+    """
+    lock = FolderLock(folder)
+    try:
+        job = job.complete()
+        texts, further = job.texts_in(folder, asked=True)
+        if further:
+            keep_inputs(folder, texts, job.layout().inputs)
+        claim(folder, job.layout(), texts)
+    finally:
+        lock.release()
+
+
+def _earlier(folder: Path) -> dict[str, Any]:
+    """Figures of a folder's last run, if this version of the program computed them."""
+    found = read_summary(folder / SUMMARY)
+    if found.get("versions") != package_versions():
+        return {}
+    return {name: value for name, value in found.items() if name not in ("status", "reason", "warnings")}
+
+
 def run(job: Study, folder: Path, context: RunContext) -> Execution:
-    """Make every result of a study in its folder, and report those that there are."""
+    """Make every result of a study in its folder, and report those that there are.
+
+    The report of further targets is kept.
+    """
     from ..report.study_page import write_page
 
     work: Execution = context.work or Execution(job, folder, context)
-    context.report = lambda stopped: write_page(work, stopped)
+    context.summary["versions"] = package_versions()
+    if not (work.study.texts_in(folder)[1] and (folder / "report.html").is_file()):
+        context.report = lambda stopped: write_page(work, stopped)
     context.console_summary = lambda summary: work.lines
     work.run()
     if work.fault is not None:
@@ -47,4 +99,4 @@ def run(job: Study, folder: Path, context: RunContext) -> Execution:
 def plan(job: Study, folder: Path, context: RunContext) -> Plan:
     """Stages with the seconds that are left of each."""
     context.work = Execution(job, folder, context)
-    return [*context.work.plan(), ("report", REPORT_S)]
+    return [*context.work.plan(), ("report", context.work.study.report_s)]

@@ -14,12 +14,11 @@ import attrs
 from ..errors import InputError
 from ..run.context import RunContext
 from ..run.usecase import UseCase
-from ..studies import STUDIES
+from ..studies import STUDIES, study
 from ..studies.use_case import use_case
 
 # Modules with `USE_CASE` by the first file of inputs, imported on demand.
 MODULES = {
-    "study.toml": ".simulate_and_place.run",
     "prepare.toml": ".prepare",
     "live.toml": ".live_bending.run",
     "diagnose.toml": ".diagnose.run",
@@ -33,11 +32,12 @@ def use_case_of(folder: Path) -> UseCase[Any]:
     # Not the Path's own question, which raises for a name that the system refuses.
     there = [module for name, module in MODULES.items() if os.path.isfile(folder / name)]
     cases: list[UseCase[Any]] = [import_module(module, __package__).USE_CASE for module in there]
-    cases += [use_case(name) for name in STUDIES if os.path.isfile(folder / f"{name}.toml")]
+    there_too = [name for name in STUDIES if os.path.isfile(folder / study(name).layout().inputs)]
+    cases += [use_case(name) for name in there_too]
     if cases:
         # A file whose first line is another's is read all the same: its reader reports the fault best.
         return next((case for case in cases if case.layout.is_of(folder)), cases[0])
-    names = (*MODULES, *(f"{name}.toml" for name in STUDIES))
+    names = (*MODULES, *dict.fromkeys(study(name).layout().inputs for name in STUDIES))
     raise InputError(
         "this folder contains no study and no other run",
         str(folder),

@@ -291,11 +291,15 @@ def test_an_option_takes_so_many_words_or_stands_alone(capsys):
     assert "expected 2 arguments" in capsys.readouterr().err
 
 
+def _properties(kind):
+    return [name for name, _ in inspect.getmembers(kind, lambda one: isinstance(one, property | cached_property))]
+
+
 @pytest.mark.parametrize("name", STUDIES)
 def test_a_declaration_is_sound(name):
     kind = study(name)
-    known = {*kind.inputs(), *kind.derived()}
-    for one in kind.stages().values():
+    known = {*kind.inputs(), *kind.derived(), *_properties(kind)}
+    for one in kind.all_stages().values():
         later = set(one.needs) - known - {one.name}
         assert not later, f"{one.name} needs {later}, which is not above it"
         known.add(one.name)

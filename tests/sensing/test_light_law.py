@@ -10,9 +10,10 @@ import pytest
 
 from mu_addon.design.parameters import load_preset
 from mu_addon.errors import InputError
-from mu_addon.sensing.guide import Centreline, Optics, arc
+from mu_addon.sensing.guide import Centreline, arc
 from mu_addon.sensing.light_law import FEATURES, MISFIT, Law, features, fit_law, straight_guide, traced
 from mu_addon.sensing.notched import well_angles
+from mu_addon.sensing.optics import Optics
 
 D = load_preset("mu-1.0x").dimensions
 

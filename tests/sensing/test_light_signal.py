@@ -10,7 +10,6 @@ from hypothesis import strategies as st
 from mu_addon.design.anchors import window
 from mu_addon.design.parameters import load_preset
 from mu_addon.errors import InputError
-from mu_addon.sensing.guide import Optics
 from mu_addon.sensing.light_law import FEATURES, Law, features
 from mu_addon.sensing.light_signal import (
     best_sets,
@@ -20,6 +19,7 @@ from mu_addon.sensing.light_signal import (
     signal_of_states,
     traced_signal,
 )
+from mu_addon.sensing.optics import Optics
 
 from .bars import bent_to_a_circle, body, of_window
 

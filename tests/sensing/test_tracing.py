@@ -7,7 +7,8 @@ import pytest
 import trimesh
 
 from mu_addon.errors import InputError
-from mu_addon.sensing.guide import Centreline, Guide, Optics, arc, swept
+from mu_addon.sensing.guide import Centreline, Guide, arc, swept
+from mu_addon.sensing.optics import Optics
 from mu_addon.sensing.tracing import beam, lambertian, trace
 
 

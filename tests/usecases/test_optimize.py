@@ -157,7 +157,7 @@ def test_a_file_that_is_not_there_is_named(tmp_path):
 
 def test_a_design_that_breaks_a_rule_is_a_row_and_not_the_end():
     design = design_of()
-    found = Optimize.stages()["units"].method(None, (50.0,), 0.2, True, design.simulated, None)
+    found = Optimize.all_stages()["units"].method(None, (50.0,), 0.2, True, design.simulated, None)
     assert (found.why, found.model_a, found.gradient.shape) == (NO_UNIT, 0, (2, 1))
     assert not observed((50.0,), found, None).sound
 

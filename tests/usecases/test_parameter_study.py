@@ -326,7 +326,7 @@ class SlowSweep(Sweep):
     @stage(
         "points",
         1.0,
-        over=attrs.evolve(Sweep.stages()["points"].over, names=("task",)),
+        over=attrs.evolve(Sweep.all_stages()["points"].over, names=("task",)),
         parallel=True,
     )
     def points(self, task: Task) -> Outcome:

@@ -43,7 +43,7 @@ WRITERS = (
     "mu_addon.fem.newton_settings",
     "mu_addon.placement.graph",
     "mu_addon.usecases.simulate_and_place.named_effects",
-    "mu_addon.usecases.simulate_and_place.job",
+    "mu_addon.studies.unit_ranking",
     "mu_addon.studies.grip",
     "mu_addon.usecases.live_bending.requests",
     "mu_addon.usecases.prepare",

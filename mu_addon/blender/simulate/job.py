@@ -17,7 +17,7 @@ from . import effects, timings
 from . import study_folder as studies
 
 if TYPE_CHECKING:
-    from ...usecases.simulate_and_place.job import Job
+    from ...studies.unit_ranking import UnitStudy
 
 
 def plan_of(root: Any, quick: bool = False) -> list[tuple[str, float]]:
@@ -74,12 +74,13 @@ SIMULATION = JobKind(
 )
 
 
-def job_of(root: Any, in_short: bool = False) -> Job:
-    """Study job from a unit's properties; in_short: its quick ranking. Raises InputError."""
+def job_of(root: Any, in_short: bool = False) -> UnitStudy:
+    """Study from a unit's properties; in_short: its quick ranking. Raises InputError."""
     # Imported late: they need the solver's packages, which a Blender may lack.
     try:
         from ...meshing.settings import MeshSettings
-        from ...usecases.simulate_and_place.job import Job, protocol_of, quick, require_paths_inside
+        from ...studies.unit_inputs import protocol_of
+        from ...studies.unit_ranking import UnitStudy
     except (ImportError, OSError, RuntimeError) as error:
         raise InputError(
             f"the solver cannot load: {error}", "", "install the extension built for this Blender and system"
@@ -90,16 +91,13 @@ def job_of(root: Any, in_short: bool = False) -> Job:
     stages = ("design", "simulate", "place") if place else ("design", "simulate")
     extra: dict[str, Any] = {}
     if place:
-        extra |= {"paths": settings.paths, "all_paths": settings.all_paths}
+        extra |= {"paths": settings.paths, "all_paths": settings.all_paths, "quick": in_short}
     if settings.self_contact:
         extra["self_friction"] = round(settings.self_friction, 6)
-    body = envelope.envelope_in(root, unit)
-    if body is not None:
-        require_paths_inside(unit, body, stages, settings.paths)
-    job = Job(
+    return UnitStudy(
         unit=unit,
         protocol=protocol_of(bpy.path.abspath(settings.protocol) if settings.protocol else None),
-        body=body,
+        body=envelope.envelope_in(root, unit),
         obstacles=obstacles.rigid_bodies(root, unit),
         effects=effects.named_effects(root),
         stages=stages,
@@ -107,5 +105,4 @@ def job_of(root: Any, in_short: bool = False) -> Job:
         self_contact=settings.self_contact,
         device=settings.device,
         **extra,
-    )
-    return quick(job) if in_short else job
+    ).complete()

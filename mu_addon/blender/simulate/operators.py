@@ -43,7 +43,7 @@ class MU_OT_simulate(ValidUnitOperator, bpy.types.Operator):
         study = root.mu_unit.study
         job = job_of(root, self.quick)
         # Imported late, with the solver's packages.
-        from ...usecases.simulate_and_place.job import write_study
+        from ...studies.use_case import write_study
 
         folder, job = unit_runs.place_of(studies.assign_folder(root), job)
         options = ["--device", study.device]

@@ -20,9 +20,9 @@ from ...reading import is_number
 from ...report.html import figure, number, table
 from ...report.plots import BY_LENGTH, BY_START, QUIET, canvas
 from ...run.summary import SUMMARY, read_summary
+from ...studies.unit_ranking import UnitStudy
 from ..parameter_study.results import figures
 from ..resume import use_case_of
-from ..simulate_and_place.study_file import LAYOUT as STUDY
 from .orders import Study
 from .parts import Design
 
@@ -83,7 +83,7 @@ def of_runs(folders: Sequence[Path]) -> Comparison:
         case, summary = use_case_of(folder), read_summary(folder / SUMMARY)
         if not summary:
             raise InputError("that run has no results", str(folder), f"start it: resume {folder}")
-        study = case.layout == STUDY
+        study = case.layout == UnitStudy.layout()
         items.append(
             (name, Study(case.read(folder), folder, summary) if study else Finished(folder, summary))
         )

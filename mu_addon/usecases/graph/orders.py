@@ -14,20 +14,21 @@ from ...graph.definition import Call, Outputs
 from ...graph.evaluation import Finished, Order
 from ...measured import Measured
 from ...meshing.settings import MeshSettings
+from ...studies.unit_inputs import protocol_of
+from ...studies.unit_ranking import UnitStudy
+from ...studies.use_case import use_case
 from ..diagnose.job import Job as DiagnoseJob
 from ..diagnose.run import USE_CASE as DIAGNOSE
 from ..simulate_and_place.extended_unit import read_extended
-from ..simulate_and_place.job import Job, grasp, protocol_of
 from ..simulate_and_place.named_effects import NamedEffects
-from ..simulate_and_place.run import USE_CASE as STUDY
 from .parts import solid_of
 
 
 @attrs.frozen(eq=False)
 class Study:
-    """A finished study: its job, its folder and its summary."""
+    """A finished study: its inputs, its folder and its summary."""
 
-    job: Job
+    job: UnitStudy
     folder: Path
     summary: Mapping[str, Any]
 
@@ -41,7 +42,7 @@ def _kept(done: Finished) -> tuple[Path, Mapping[str, Any]]:
     return done.folder, done.summary
 
 
-def _simulated(call: Call) -> Job:
+def _simulated(call: Call) -> UnitStudy:
     """Study of a node Simulate; raises InputError."""
     s, design = call.settings, call.inputs["unit"]
     unit, effects = design.unit, NamedEffects(orientation_deg=s["orientation_deg"], where=call.node)
@@ -51,7 +52,7 @@ def _simulated(call: Call) -> Job:
         unit, effects = found.unit, attrs.evolve(found.effects, orientation_deg=s["orientation_deg"])
     obstacles = tuple(body for _, body in call.inputs["obstacles"])
     require_beside(obstacles, unit.dimensions, design.body)
-    return Job(
+    return UnitStudy(
         unit=unit,
         protocol=protocol_of(s["protocol"] or None),
         mesh=MeshSettings(refine=s["refine"]),
@@ -65,7 +66,7 @@ def _simulated(call: Call) -> Job:
     )
 
 
-def _placed(call: Call) -> Job:
+def _placed(call: Call) -> UnitStudy:
     """Study of a node Rank Paths: the simulated one with its paths. Raises InputError."""
     s, study = call.settings, call.inputs["study"]
     return attrs.evolve(
@@ -75,7 +76,7 @@ def _placed(call: Call) -> Job:
         mesh_check=s["mesh_check"],
         all_paths=s["all_paths"],
         paths=s["paths"],
-        most_checks=s["checks"],
+        checks=s["checks"],
         workers=s["workers"],
     )
 
@@ -124,19 +125,19 @@ def figure_of(call: Call) -> Outputs:
 
 def simulate_order(call: Call) -> Order:
     """Run that simulates a unit."""
-    return Order(STUDY, _simulated(call))
+    return Order(use_case("simulate"), _simulated(call))
 
 
 def place_order(call: Call) -> Order:
     """Run that ranks a study's paths, continuing it."""
-    return Order(STUDY, _placed(call), after=call.inputs["study"].folder)
+    return Order(use_case("place"), _placed(call), after=call.inputs["study"].folder)
 
 
 def solid_order(call: Call) -> Order:
     """Run that builds the printable solid of linked parts."""
     unit, given, path = solid_of(call)
-    job = Job(unit, grasp(), stages=("design",), quality=given.quality, body=given.body, path=path)
-    return Order(STUDY, job)
+    job = UnitStudy(unit=unit, stages=("design",), quality=given.quality, body=given.body, path=path)
+    return Order(use_case("design"), job)
 
 
 def diagnose_order(call: Call) -> Order:

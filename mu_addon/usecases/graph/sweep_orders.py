@@ -15,10 +15,11 @@ from ...graph.definition import Call, Outputs
 from ...graph.evaluation import Finished, Order
 from ...reading import file_text
 from ...studies.sweep import LAST, TABLE, Sweep
+from ...studies.unit_inputs import protocol_of
+from ...studies.unit_ranking import UnitStudy
 from ...studies.use_case import use_case
 from ..parameter_study.plan import Plan
 from ..parameter_study.variable import Inputs, changed_inputs, variable
-from ..simulate_and_place.job import job_with, protocol_of
 from ..simulate_and_place.settings import STAGES
 from .parts import Design, refuse_body
 from .sweep_nodes import GOALS
@@ -77,7 +78,7 @@ def _plan_of(call: Call) -> Plan:
         )
     variables = tuple(variable(name, dict(table), call.node) for name, table in ranges)
     # A setting that is wrong for every point is reported before any work.
-    job_with(tables, call.node, unit=design.unit, protocol=protocol, workers=1)
+    UnitStudy.of_tables(tables, Path(call.node), unit=design.unit, protocol=protocol, workers=1)
     return Plan(
         inputs=Inputs(design.unit, protocol, tables),
         variables=variables,

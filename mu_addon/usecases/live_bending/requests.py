@@ -17,9 +17,9 @@ from ...files import write_json
 from ...meshing.settings import MeshSettings
 from ...run.folder import FolderLayout
 from ...run.inputs import FORMAT, read_inputs
+from ...studies.unit_ranking import UnitStudy as Study
+from ...studies.use_case import write_study
 from ...toml_writer import toml_text
-from ..simulate_and_place.job import Job as Study
-from ..simulate_and_place.job import write_study
 
 REQUEST, BENT, ASKED = "request.json", "bent.json", "asked"
 CELLS = "cells"

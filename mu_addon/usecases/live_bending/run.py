@@ -35,8 +35,7 @@ from ...reading import file_bytes, parse_json
 from ...report.motion_files import Surface, SurfaceFields, surfaces_of, write_model_a
 from ...run.context import RunContext
 from ...run.usecase import UseCase
-from ..simulate_and_place.job import Job as Study
-from ..simulate_and_place.job import read_job as read_study
+from ...studies.unit_ranking import UnitStudy as Study
 from .requests import ASKED, BENT, CELLS, LAYOUT, LEVELS, REQUEST, Job, read_job
 
 Array = np.ndarray[Any, Any]
@@ -132,7 +131,7 @@ class LiveBending:
             return False
         self._number = number
         try:
-            study = read_study(self.folder / ASKED / str(number))
+            study = Study.read(self.folder / ASKED / str(number))
             for refine, error in LEVELS:
                 if refine != LEVELS[0][0]:
                     if study.body is None:
@@ -199,7 +198,7 @@ class LiveBending:
                     model = relocated(drawn.model, mesh)
                     model.load = study.effects.load(unit, mesh, model.device)
                     return _Solved(study, drawn, mesh, model, {0.0: rest(mesh)})
-        settings = study.mesh_settings(study.mesh)
+        settings = study.meshed_as
         mesh = mesh_printed(study.unit, settings, cache=self.folder / CELLS, body=study.body)
         self._look()
         model = study.model(mesh)

@@ -20,14 +20,16 @@ from ...meshing.settings import SELF_CONTACT
 from ...reading import parse_toml
 from ...run.folder import RUN
 from ...run.inputs import FORMAT, read_inputs, read_toml, structured
-from ..simulate_and_place.job import OF_FILES, Job, job_with, protocol_of
+from ...studies.unit_inputs import protocol_of
+from ...studies.unit_ranking import UnitStudy
 from ..simulate_and_place.settings import STAGES
-from ..simulate_and_place.study_file import FILES
 from .point import Task
 from .settings import GRID, LAST_STAGE, MEMORY, METHOD, MINUTES, MOST_POINTS, POINTS, RESIN, SEED, SOBOL
 from .variable import FILE, Inputs, Variable, changed_inputs, variable
 
 Array = np.ndarray[Any, Any]
+OF_FILES = ("unit", "body", "protocol", "obstacles", "friction")
+"""Keys of study.toml that belong to files beside it."""
 
 
 def sample(method: str, count: int, dimensions: int, seed: int, before: Array | None = None) -> Array:
@@ -70,7 +72,7 @@ class Point:
 
     number: int
     values: Mapping[str, Any]
-    job: Job | None
+    job: UnitStudy | None
     error: MuError | None = None
 
 
@@ -146,7 +148,8 @@ class Plan:
         values = self.values[number - 1]
         try:
             changed = changed_inputs(self.inputs, values, self.folder)
-            job = job_with(changed.tables, "[vary]", unit=changed.unit, protocol=changed.protocol, workers=1)
+            given = {"unit": changed.unit, "protocol": changed.protocol, "workers": 1}
+            job = UnitStudy.of_tables(changed.tables, Path("[vary]"), **given)
             return Point(number, values, job)
         except MuError as error:
             return Point(number, values, None, error)
@@ -270,7 +273,7 @@ def planned(
     own = {name: getattr(file, name) for name in plain}
     plan = Plan(inputs, variables, files, count=file.points, counts=counts or (file.points,), **own)
     # A setting that is wrong for every point is reported before any work, and not as many failures.
-    job_with(settings, where, unit=inputs.unit, protocol=inputs.protocol, workers=1)
+    UnitStudy.of_tables(settings, Path(where), unit=inputs.unit, protocol=inputs.protocol, workers=1)
     for v in variables:
         if v.name == FILE:
             for name in v.values:
@@ -300,7 +303,7 @@ def _settings(found: Any, stage: str, where: str) -> dict[str, Any]:
     if not isinstance(found, dict):
         raise InputError(f"{stage} is not a table", where, f"write it as [{stage}]")
     for key in found:
-        if key in FILES or key in OF_FILES:
+        if key in OF_FILES:
             raise InputError(
                 f"a parameter study does not take {key}",
                 f"{where}, [{stage}]",

@@ -16,8 +16,7 @@ from ...design.quantity import describe
 from ...errors import InputError, did_you_mean
 from ...fem.protocol import Protocol, read_protocol
 from ...meshing.settings import OF_CONTINUUM, MeshSettings, require_printed
-from ...placement.graph import Limits
-from ..simulate_and_place.job import SETTINGS
+from ...studies.unit_ranking import UnitStudy
 
 FACTOR = "protocol.factor"
 FILE = "simulate.protocol"
@@ -122,10 +121,10 @@ def variable_names() -> list[str]:
     """Names of all inputs that can be varied, as in unit.toml and study.toml."""
     unit = [f"{s.section}.{d.name}" for s in SECTIONS for d in describe(s)]  # type: ignore[attr-defined]
     unit = [name for name in unit if name not in OF_CONTINUUM]
-    study = [f"{stage}.{key}" for stage, keys in SETTINGS.items() for key in keys]
+    settings = UnitStudy.inputs().items()
+    study = [f"{one.target}.{n}" for n, one in settings if one.kind == "setting" and one.decides]
     mesh = [f"simulate.mesh.{f.name}" for f in attrs.fields(MeshSettings)]
-    search = [f"place.search.{f.name}" for f in attrs.fields(Limits)]
-    return ["scale", *unit, FACTOR, FILE, *study, *mesh, *search, "place.search.most_checks"]
+    return ["scale", *unit, FACTOR, FILE, *study, "simulate.orientation_deg", *mesh]
 
 
 @attrs.frozen

@@ -3,18 +3,15 @@
 from __future__ import annotations
 
 import io
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager
-from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from ...files import write_bytes
 from ...report.heatmaps import draw_deviation
-from ...report.motion_files import FOLDER
 from ...report.plots import BY_LENGTH, CHOSEN, INK, QUIET, WIDTH, canvas, label, signed, styled
-from ...report.results import Floats, Signals
+from ...report.results import Floats, Picture, Signals
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -77,9 +74,9 @@ def delta_name(path: str) -> str:
     return f"delta-{path}.png"
 
 
-def write_angle(folder: Path, pressure_kPa: Floats, angle_deg: Floats) -> None:
-    """Write the bending angle over the pressure, (s,) each, to `folder`/motion. Raises OutputError."""
-    with _square(folder / FOLDER / ANGLE) as (_, axes):
+def angle_picture(pressure_kPa: Floats, angle_deg: Floats) -> Picture:
+    """The bending angle over the pressure, (s,) each."""
+    with _square() as (_, axes, png):
         axes.axhline(0, color=QUIET, linewidth=0.8)
         axes.axvline(0, color=QUIET, linewidth=0.8)
         axes.plot(pressure_kPa, angle_deg, "-o", color=BY_LENGTH[0], markersize=4, linewidth=2)
@@ -94,29 +91,31 @@ def write_angle(folder: Path, pressure_kPa: Floats, angle_deg: Floats) -> None:
                 va="center",
                 fontsize=10,
             )
+    return Picture(png(), "Bending angle against pressure.", "Bending angle against pressure.")
 
 
-def write_delta(folder: Path, path: str, delta_mm: Floats, time_s: Floats, top_mm: float) -> None:
-    """Write a path's deviation (k, j), colours from 0 to `top_mm`, to `folder`/motion. Raises OutputError."""
-    with _square(folder / FOLDER / delta_name(path)) as (figure, axes):
+def delta_picture(path: str, delta_mm: Floats, time_s: Floats, top_mm: float) -> Picture:
+    """A path's deviation (k, j) over length and time, colours from 0 to `top_mm`."""
+    with _square() as (figure, axes, png):
         image = draw_deviation(axes, delta_mm, top_mm, (float(time_s[0]), float(time_s[-1])))
         axes.set(xlabel="length [%]", ylabel="time [s]", title=f"{label(path)}: deviation [mm]")
         axes.set_xticks((0, 50, 100))
         bar = figure.colorbar(image, ax=axes, fraction=0.07, pad=0.04)
         bar.ax.tick_params(labelsize=8, length=2)
         bar.outline.set_linewidth(0.6)
+    words = f"Deviation of {path} over length and time."
+    return Picture(png(), words, words)
 
 
 @contextmanager
-def _square(path: Path) -> Iterator[tuple[Figure, Axes]]:
-    """A figure and its axes, written as PNG once the body has drawn it."""
+def _square() -> Iterator[tuple[Figure, Axes, Callable[[], bytes]]]:
+    """A figure, its axes, and what gives its PNG once the body has drawn it."""
     from matplotlib.backends.backend_agg import FigureCanvasAgg
 
     with styled(INCHES, INCHES) as figure:
         FigureCanvasAgg(figure)
         figure.set_layout_engine("constrained")
         axes: Any = figure.subplots()
-        yield figure, axes
         stream = io.BytesIO()
+        yield figure, axes, stream.getvalue
         figure.savefig(stream, format="png", dpi=DPI, facecolor="white", metadata={"Software": None})
-    write_bytes(path, stream.getvalue())

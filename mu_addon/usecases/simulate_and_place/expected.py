@@ -11,13 +11,15 @@ import numpy as np
 from ...placement.elimination import first_and_rest
 
 if TYPE_CHECKING:
-    from ...run.progress_estimate import Plan
-    from .job import Job
+    from ...studies.unit_ranking import UnitStudy
 
 BEST = "solid with the best path"
 """Stage of the printable unit with the path that a ranking chose."""
+PATHS_MOTION = "motion of the paths"
+"""Stage of the displacements, stresses and stretches of units with a sensor, for display."""
 FULL_S = {
-    "solid": 1.5, "mesh": 10.0, "Model A": 350.0, "candidates": 2200.0, "mesh check": 450.0, "map": 8.0,
+    "solid": 1.5, "mesh": 10.0, "Model A": 350.0, "candidates": 2140.0, "mesh check": 450.0, "map": 8.0,
+    PATHS_MOTION: 60.0,
     "light": 7.0, BEST: 2.5, "ranking of the lattice's paths": 30.0, "check of the best paths": 2200.0,
     "motion of the best path": 60.0, "report": 14.0,
 }  # fmt: skip
@@ -26,9 +28,7 @@ UNSOLVED_REPORT_S = 7.0
 """Seconds of a report on a unit that was not simulated."""
 LEAST_S = {"Model A": 1.0, "candidates": 1.5, "mesh check": 3.5, "map": 0.3}
 """Seconds of a stage that are independent of the mesh, for stages that depend on it."""
-SOLVED = ("Model A", "candidates", "mesh check", "check of the best paths")
-SOLVING = {"Model A": 0.88, "candidates": 0.97}
-"""Share of a stage's time until its last equilibrium."""
+SOLVED = ("Model A", "candidates", "mesh check", "check of the best paths", PATHS_MOTION)
 TOUCHING = 6.0
 """Factor on the seconds of a state at -20 kPa where walls touch; by the square of that."""
 LEFT_UNDER_PRESSURE = 0.55
@@ -49,25 +49,27 @@ BYTES = {"interactive": 30_000_000, "export": 150_000_000}
 BYTES_A_NODE = {"simulate": 300, "place": 1000}
 
 
-def expected_nodes(job: Job) -> int:
+def expected_nodes(job: UnitStudy) -> int:
     """Expected number of a mesh's nodes, from mu-1.0x: 54 000 at a refinement of 0.35, 81 000 at 1."""
     share = {"half": 1.0, "full": 2.0}[job.mesh.fraction]
     units = job.unit.dimensions.count / 6
     return int(share * units * (50_000 + 31_000 * job.mesh.refine**2.7))
 
 
-def expected_bytes(job: Job, nodes: int) -> int:
-    """Disk space that a study with so many nodes takes."""
+def expected_bytes(job: UnitStudy) -> int:
+    """Disk space that a study takes."""
+    if "simulate" not in job.stages:
+        return BYTES[job.quality]
     per_node = BYTES_A_NODE["place" if "place" in job.stages else "simulate"]
-    return BYTES[job.quality] + nodes * per_node * len(np.unique(job.samples[1]))
+    return BYTES[job.quality] + expected_nodes(job) * per_node * len(job.samples.distinct_kPa)
 
 
 def stage_names(place: bool, mesh_check: bool, graph: bool, simulate: bool = True) -> list[str]:
     """Names of a study's stages."""
     names = ["solid", *(["mesh", "Model A"] if simulate else [])]
     if place:
-        names += ["candidates", *(["mesh check"] if mesh_check else []), "map", "light"]
-        names += [name for name in FULL_S if "path" in name and name != BEST] if graph else []
+        names += ["candidates", *(["mesh check"] if mesh_check else []), PATHS_MOTION, "map", "light"]
+        names += [n for n in FULL_S if "path" in n and n not in (BEST, PATHS_MOTION)] if graph else []
         names.append(BEST)
     return [*names, "report"]
 
@@ -86,13 +88,13 @@ class Size:
     known: int = 0
 
     @classmethod
-    def of(cls, job: Job) -> Size:
+    def of(cls, job: UnitStudy) -> Size:
         """Of a study."""
-        pressure = job.samples[1]
-        states = pressure if job.in_time else np.unique(pressure)
-        known = 0 if job.in_time or job.all_paths else PATHS_CHECKED if job.mesh_check else 1
+        in_time = job.mechanics.in_time
+        states = job.samples.pressure_kPa.tolist() if in_time else job.samples.distinct_kPa
+        known = 0 if in_time or job.all_paths else PATHS_CHECKED if job.mesh_check else 1
         count = job.unit.dimensions.count
-        return cls(count, job.mesh.refine, job.self_contact, tuple(states.tolist()), known)
+        return cls(count, job.mesh.refine, job.self_contact, tuple(states), known)
 
     def factor(self, stage: str) -> float:
         """Work of a stage by that of the shipped protocol on the default mesh of six chambers, in contact."""
@@ -110,7 +112,7 @@ class Size:
         return body * (states * paths - left) / 10
 
 
-def work(job: Job | Size, pressures_kPa: Iterable[float]) -> float:
+def work(job: Size, pressures_kPa: Iterable[float]) -> float:
     """Work of the states at these pressures, in units of one under pressure; none at 0 kPa."""
     touches = job.self_contact
     return sum(max(TOUCHING * (p / 20.0) ** 2, 1.0) if touches and p < 0 else 1.0 for p in pressures_kPa if p)
@@ -127,13 +129,6 @@ def of_mesh(refine: float) -> float:
     return float(refine ** (BY_WALL if refine < 1.0 else BY_REFINEMENT))
 
 
-def plan_of(job: Job) -> Plan:
-    """The stages of a study with the expected seconds of each on two cores."""
-    place, simulates = "place" in job.stages, "simulate" in job.stages
-    names = stage_names(place, job.mesh_check, job.paths == "graph", simulates)
-    if job.path:
-        names.insert(1, f"solid with {job.path}")
-    if not simulates:
-        return [*((name, seconds_of(name)) for name in names[:-1]), (names[-1], UNSOLVED_REPORT_S)]
-    size = Size.of(job)
-    return [(name, seconds_of(name, size.factor(name))) for name in names]
+def seconds(job: UnitStudy, name: str) -> float:
+    """Expected seconds of a study's stage on two cores."""
+    return seconds_of(name, Size.of(job).factor(name) if "simulate" in job.stages else 1.0)

@@ -3,25 +3,23 @@
 from __future__ import annotations
 
 import itertools
-from typing import TYPE_CHECKING, Any
+from collections.abc import Generator, Sequence
+from typing import Any
 
+import attrs
 import numpy as np
 
 from ...body.response import bar_response
 from ...body.waveguide import bar_of
+from ...design.anchors import anchor_points
+from ...design.parameters import Unit
 from ...design.quantity import in_kPa
 from ...errors import ConvergenceError, InputError
 from ...fem.kinematics import probe
-from ...fem.materials import Materials
-from ...fem.model import Model
 from ...fem.trajectory import Trajectory, whole_body
-from ...files import write_csv
-from ...placement.candidates import Candidate
-from ...placement.graph import Graph, lattice_graph
-from ...placement.response import Response
-from ...placement.search import SearchSettings, front, search_paths
+from ...placement.graph import Graph, Limits, lattice_graph
+from ...placement.search import Search, SearchSettings, front, searching
 from ...placement.sensitivity_map import (
-    Parity,
     deviation_map,
     gradients_of,
     influence_map,
@@ -32,74 +30,65 @@ from ...placement.sensitivity_map import (
     shares_of_time,
     stable_part,
 )
-from ...report.motion_files import write_sensitivity
-from ...report.results import LatticePath, LatticeSearch
-from ...report.vtk import write_fields
-
-if TYPE_CHECKING:
-    from .job import Job
-    from .study import Study
+from ...report.results import LatticePath
+from .mechanics import Mechanics
 
 Array = np.ndarray[Any, Any]
 
-MAP = "sensitivity.vtu"
-PATHS = "paths.csv"
 # Beyond this their list alone takes gigabytes.
 MOST_PATHS = 200_000
 
 
-def sensitivity_map(study: Study) -> Array | None:
-    """dJ_hat (m,) in mm by each element's relative stiffening, from Model A on, as `sensitivity.vtu`.
+@attrs.frozen(eq=False)
+class Sensitivity:
+    """dJ_hat (m,) in mm by each element's relative stiffening; empty of a unit that is stable nowhere.
 
-    Over the pressures at which the unit is stable; None, and no file, without any.
+    modulus_MPa (m,): of each element; unstable_kPa: pressures that are left out.
     """
-    assert study.mesh is not None
-    with study.progress.stage("map"):
-        model = study.job.model(study.mesh)
-        monitor = probe(study.mesh, study.anchors)
-        materials = study.job.materials(study.mesh)
-        sides = parities(model)
-        trajectory = _stable(study, model, materials, sides, "The sensitivity map leaves")
-        if not loaded(trajectory):
-            return None
-        chosen = representative_pressures(trajectory)
-        found = influence_map(model, materials, trajectory, monitor, chosen, sides)
-        pressures = np.array([s.pressure_MPa for s in loaded(trajectory)])
-        gradients = gradients_of(trajectory, study.anchors, monitor, study.job.stations)
-        dJ = deviation_map(found.at(pressures), gradients, shares_of_time(trajectory))
-        modulus, _ = materials.small_strain(len(dJ))
-        fields = {
-            "dJ_by_relative_stiffening_mm": dJ,
-            "dJ_by_modulus_mm_per_MPa": dJ / modulus,
-            "modulus_MPa": modulus,
-        }
-        write_fields(study.folder / MAP, study.mesh, fields)
-        write_sensitivity(study.folder, study.mesh, dJ / modulus)
-    study.context.summary["sensitivity"] = {"file": MAP, "largest_mm": float(dJ.max())}
-    return dJ
+
+    dJ_mm: Array
+    modulus_MPa: Array
+    unstable_kPa: tuple[float, ...]
 
 
-def _stable(
-    study: Study, model: Model, materials: Materials, sides: list[Parity], what_leaves: str
-) -> Trajectory:
-    """Stable part of Model A's motion; the study warns of pressures that `what_leaves` out."""
-    assert study.trajectory is not None
-    found = stable_part(model, materials, study.trajectory, sides)
-    kept = {s.pressure_MPa for s in found.solved}
-    out = [in_kPa(s.pressure_MPa) for s in study.trajectory.solved if s.pressure_MPa not in kept]
-    if out:
-        study.warn(
-            f"{what_leaves} out {', '.join(f'{p:g}' for p in sorted(out))} kPa: there the unit is "
-            "unstable and would leave its bending plane. Angles and J_hat there are those of a unit that is "
-            "kept in its plane."
-        )
-    return found
+def sensitivity_map(mechanics: Mechanics, motion: Trajectory, stations: int) -> Sensitivity:
+    """The map from Model A on, over the pressures at which the unit is stable."""
+    model, materials = mechanics.model(motion.mesh), mechanics.materials(motion.mesh)
+    anchors = anchor_points(mechanics.unit)
+    monitor, sides = probe(motion.mesh, anchors), parities(model)
+    stable = stable_part(model, materials, motion, sides)
+    out = _left_out(motion, stable)
+    if not loaded(stable):
+        return Sensitivity(np.empty(0), np.empty(0), out)
+    chosen = representative_pressures(stable)
+    found = influence_map(model, materials, stable, monitor, chosen, sides)
+    pressures = np.array([s.pressure_MPa for s in loaded(stable)])
+    gradients = gradients_of(stable, anchors, monitor, stations)
+    dJ = deviation_map(found.at(pressures), gradients, shares_of_time(stable))
+    modulus, _ = materials.small_strain(len(dJ))
+    return Sensitivity(dJ, modulus, out)
 
 
-def chains_within(job: Job) -> tuple[Graph, list[tuple[int, ...]]]:
-    """The lattice graph and its chains within a job's limits; raises InputError for none or too many."""
-    graph = lattice_graph(job.unit.printed)
-    chains = list(itertools.islice(graph.chains(job.limits), MOST_PATHS + 1))
+def _left_out(motion: Trajectory, stable: Trajectory) -> tuple[float, ...]:
+    kept = {s.pressure_MPa for s in stable.solved}
+    return tuple(sorted(in_kPa(s.pressure_MPa) for s in motion.solved if s.pressure_MPa not in kept))
+
+
+def unstable_at(pressures_kPa: Sequence[float], what_leaves: str) -> str:
+    """Warning of pressures at which a unit is unstable; "" without any."""
+    if not pressures_kPa:
+        return ""
+    return (
+        f"{what_leaves} out {', '.join(f'{p:g}' for p in pressures_kPa)} kPa: there the unit is "
+        "unstable and would leave its bending plane. Angles and J_hat there are those of a unit that is "
+        "kept in its plane."
+    )
+
+
+def chains_within(unit: Unit, limits: Limits) -> tuple[Graph, list[tuple[int, ...]]]:
+    """The lattice graph and its chains within limits; raises InputError for none or too many."""
+    graph = lattice_graph(unit.printed)
+    chains = list(itertools.islice(graph.chains(limits), MOST_PATHS + 1))
     options = "--shortest-cells, --longest-cells, --bend-deg"
     if not chains:
         raise InputError(
@@ -116,123 +105,96 @@ def chains_within(job: Job) -> tuple[Graph, list[tuple[int, ...]]]:
     return graph, chains
 
 
-def search_graph(study: Study) -> LatticeSearch:
-    """The path of the whole lattice graph that disturbs Model A least, within the study's limits.
+@attrs.frozen(eq=False)
+class Predicted:
+    """Predicted J_hat (n,) in mm of every chain of the lattice; unstable_kPa: pressures that are left out."""
 
-    All chains are ranked by a reduced response; the best are then solved on the whole body, until no
-    other is likely to beat them. Raises InputError where no chain is within the limits.
+    J_mm: Array
+    unstable_kPa: tuple[float, ...]
+
+
+def predicted(mechanics: Mechanics, motion: Trajectory, limits: Limits, stations: int) -> Predicted:
+    """Every chain's deviation by the reduced response about Model A's stable states.
+
+    Raises ConvergenceError where there is none.
     """
-    assert study.mesh is not None
-    assert study.trajectory is not None
-    job = study.job
-    graph, chains = chains_within(job)
-    lengths = np.array([graph.lengths[graph.steps_of(c)].sum() for c in chains])
-    with study.progress.stage("ranking of the lattice's paths"):
-        predicted = _predicted(study, graph, chains)
-    mesh, trajectory = whole_body(study.mesh, study.trajectory)
-
-    def check(numbers: Array) -> Array:
-        paths = {n: graph.nodes[list(chains[n])] for n in numbers.tolist()}
-        made = [n for n, points in paths.items() if _is_printable(study, points)]
-        candidates = [Candidate(f"path{n}", 0, paths[n]) for n in made]
-        solved = study.solve_candidates(mesh, trajectory, candidates)[0] if candidates else []
-        found = dict(zip(made, (e.deviation.J_hat for e in solved), strict=True))
-        return np.array([found.get(n, np.nan) for n in paths])
-
-    with study.progress.stage("check of the best paths"):
-        outcome = search_paths(predicted, check, SearchSettings(most=job.most_checks))
-    if not outcome.complete:
-        study.warn(
-            f"After {job.most_checks} full solutions, the probability that an unsolved path is better than "
-            f"the best one is up to {outcome.risk:.0%}: increase --checks."
-        )
-    if len(outcome.left_out):
-        study.warn(
-            f"{len(outcome.left_out)} paths that the search found are left out: no waveguide can be "
-            "printed along them."
-        )
-    best = set(front(lengths, outcome.exact_mm).tolist())
-    known = np.isfinite(outcome.exact_mm)
-    order = np.lexsort((predicted, np.where(known, outcome.exact_mm, np.inf)))
-    order = order[~np.isin(order, outcome.left_out)]
-    every = [
-        LatticePath(
-            f"path{n}",
-            graph.nodes[list(chains[n])],
-            float(lengths[n]),
-            float(predicted[n]),
-            float(outcome.exact_mm[n]),
-            n in best,
-        )
-        for n in order.tolist()
-    ]
-    _write(study, every)
-    study.search = LatticeSearch(every[: len(outcome.checked)], len(chains), outcome.risk)
-    first = every[0]
-    # A motion to look at is of a whole mesh, or of a half and its image.
-    if study.mesh.symmetry in ((), ("x",)):
-        with study.progress.stage("motion of the best path"):
-            alone = Candidate(first.name, 0, first.points)
-            study.solve_candidates(mesh, trajectory, [alone], to_look_at=True)
-    study.context.summary["search"] = {
-        "paths": len(chains),
-        "checked": len(outcome.checked),
-        "risk_that_an_unchecked_one_is_better": outcome.risk,
-        "best": {
-            "name": first.name,
-            "points_mm": first.points.tolist(),
-            "length_mm": first.length_mm,
-            "J_hat_mm": first.j_hat,
-            "predicted_J_hat_mm": first.predicted_mm,
-        },
-    }
-    return study.search
-
-
-def _is_printable(study: Study, points: Array) -> bool:
-    """Return True if a waveguide can be printed along a path (h, 3) in mm."""
-    try:
-        bar_of(study.job.unit, points)
-    except InputError:
-        return False
-    return True
-
-
-def _response(study: Study, stable: Trajectory, graph: Graph) -> Response:
-    """The response that ranks paths, about Model A's motion so far, `stable`."""
-    assert study.mesh is not None
-    job = study.job
-    mesh, trajectory = whole_body(study.mesh, stable)
-    monitor = probe(mesh, study.anchors)
-    return bar_response(job.model(mesh), job.materials(mesh), job.unit.printed, trajectory, monitor, graph)
-
-
-def _predicted(study: Study, graph: Graph, chains: list[tuple[int, ...]]) -> Array:
-    """Predicted J_hat (n,) in mm of every chain."""
-    assert study.mesh is not None
-    monitor = probe(study.mesh, study.anchors)
-    model, materials = study.job.model(study.mesh), study.job.materials(study.mesh)
-    stable = _stable(study, model, materials, parities(model), "The ranking of paths leaves")
+    graph, chains = chains_within(mechanics.unit, limits)
+    model, materials = mechanics.model(motion.mesh), mechanics.materials(motion.mesh)
+    stable = stable_part(model, materials, motion, parities(model))
     if not loaded(stable):
         raise ConvergenceError(
             "the unit is unstable at every pressure of the protocol, so that its paths cannot be ranked",
             "--paths graph",
             "simulate smaller pressures, or leave out --paths graph",
         )
-    found = _response(study, stable, graph)
+    anchors = anchor_points(mechanics.unit)
+    mesh, whole = whole_body(motion.mesh, stable)
+    found = bar_response(
+        mechanics.model(mesh),
+        mechanics.materials(mesh),
+        mechanics.unit.printed,
+        whole,
+        probe(mesh, anchors),
+        graph,
+    )
     pressures = np.array([s.pressure_MPa for s in loaded(stable)])
-    gradients = gradients_of(stable, study.anchors, monitor, study.job.stations)
+    gradients = gradients_of(stable, anchors, probe(motion.mesh, anchors), stations)
     shares = shares_of_time(stable)
     # Not all displacements at once: there may be tens of thousands of paths.
     parts = [chains[i : i + 2000] for i in range(0, len(chains), 2000)]
-    return np.concatenate(
-        [mean_deviation(gradients, found.displacements(part, pressures), shares) for part in parts]
-    )
+    J = [mean_deviation(gradients, found.displacements(part, pressures), shares) for part in parts]
+    return Predicted(np.concatenate(J), _left_out(motion, stable))
 
 
-def _write(study: Study, paths: list[LatticePath]) -> None:
-    """paths.csv: every path, the solved ones first, by J_hat or else by its prediction."""
-    rows = [
+def is_printable(unit: Unit, points: Array) -> bool:
+    """Return True if a waveguide can be printed along a path (h, 3) in mm."""
+    try:
+        bar_of(unit, points)
+    except InputError:
+        return False
+    return True
+
+
+def checking(predicted_mm: Array, most: int) -> Generator[list[int], Sequence[float], Search]:
+    """Yield numbers of chains to solve, get their J_hat in mm (nan: impossible), and return the search."""
+    search = searching(predicted_mm, SearchSettings(most=most))
+    asked = next(search)
+    while True:
+        J = yield asked.tolist()
+        try:
+            asked = search.send(np.array(J, float))
+        except StopIteration as end:
+            outcome: Search = end.value
+            return outcome
+
+
+def lattice_paths(unit: Unit, limits: Limits, predicted_mm: Array, outcome: Search) -> list[LatticePath]:
+    """Every possible path of the lattice, the solved ones first, by J_hat or else by its prediction."""
+    graph, chains = chains_within(unit, limits)
+    lengths = np.array([graph.lengths[graph.steps_of(c)].sum() for c in chains])
+    best = set(front(lengths, outcome.exact_mm).tolist())
+    known = np.isfinite(outcome.exact_mm)
+    order = np.lexsort((predicted_mm, np.where(known, outcome.exact_mm, np.inf)))
+    order = order[~np.isin(order, outcome.left_out)]
+    return [
+        LatticePath(
+            f"path{n}",
+            graph.nodes[list(chains[n])],
+            float(lengths[n]),
+            float(predicted_mm[n]),
+            float(outcome.exact_mm[n]),
+            n in best,
+        )
+        for n in order.tolist()
+    ]
+
+
+COLUMNS = ("path", "length_mm", "predicted_J_hat_mm", "J_hat_mm", "on_front", "points_mm")
+
+
+def rows(paths: Sequence[LatticePath]) -> list[tuple[str, ...]]:
+    """Rows of paths.csv."""
+    return [
         (
             p.name,
             f"{p.length_mm:.6g}",
@@ -243,5 +205,3 @@ def _write(study: Study, paths: list[LatticePath]) -> None:
         )
         for p in paths
     ]
-    columns = ["path", "length_mm", "predicted_J_hat_mm", "J_hat_mm", "on_front", "points_mm"]
-    write_csv(study.folder / PATHS, columns, rows)

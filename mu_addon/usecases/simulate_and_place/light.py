@@ -8,13 +8,13 @@ from typing import TYPE_CHECKING, Any
 import attrs
 import numpy as np
 
+from ...design.anchors import anchor_points, windows
 from ...design.waveguide import waveguide
 from ...errors import InputError
-from ...files import write_csv
+from ...fem.bending_angle import TipSection
 from ...report.results import Checks, Signals
 from ...run.cache import Cache, key
 from ...sensing.embedded_waveguide import EmbeddedWaveguide, Joints, embed_waveguide
-from ...sensing.guide import Optics
 from ...sensing.light_law import CURVATURE_OF_WELLS, Law, features, fit_law
 from ...sensing.light_signal import (
     best_sets,
@@ -24,10 +24,13 @@ from ...sensing.light_signal import (
     signal_of_nodes,
     traced_signal,
 )
+from ...sensing.optics import Optics
 
 if TYPE_CHECKING:
     from ...design.dimensions import Dimensions
-    from .study import Study
+    from ...design.parameters import Unit
+    from ...fem.trajectory import Trajectory
+    from .ranking import Ranking
 
 Array = np.ndarray[Any, Any]
 
@@ -39,47 +42,45 @@ SPREAD = 0.002
 _CHECKS = 5
 
 
-def signals(study: Study, optics: Optics) -> Signals | None:
-    """Follow light along every candidate path through the motion of Model A, after the paths were ranked.
+def light_signals(
+    unit: Unit,
+    optics: Optics,
+    motion: Trajectory,
+    ranking: Ranking,
+    has_gravity: bool,
+    cache: Cache,
+    update: Callable[[float], None],
+) -> tuple[Signals, dict[str, str]]:
+    """Light along every candidate path through the motion of Model A, and why some paths have none, by name.
 
-    None, and a warning, for a unit that does not bend or a resin that is too dark.
+    has_gravity: the unit at rest differs from the drawn one, by its weight. Raises InputError for a unit that
+    does not bend, a resin that is too dark, or no path with room for a waveguide.
     """
-    try:
-        return _signals(study, optics)
-    except InputError as error:
-        study.warn(f"The light signal is not available: {error.what} ({error.where}).")
-        return None
-
-
-def _signals(study: Study, optics: Optics) -> Signals:
-    assert study.mesh is not None
-    assert study.trajectory is not None
-    unit = study.job.unit
-    with study.progress.stage("light", expected_s=10.0):
-        law = cached_law(unit.printed, optics, study.cache, study.progress.update)
-        states = study.trajectory.solved
-        # The state without pressure comes first, whether or not a sample meets it.
-        still = next((s.u for s in states if not s.pressure_MPa), np.zeros_like(study.mesh.nodes))
-        displacements = [still, *(s.u for s in states)]
-        angle = np.array([study.bending_angle_deg(u) + 0.0 for u in displacements])
-        joints = Joints.of(study.mesh, study.anchors)
-        moved = [joints.moved(u) for u in displacements]
-        bars = _bars(study)
-        own = {name: [(at[i], turned[i]) for at, turned in moved] for name, (i, _) in bars.items()}
-        found = {name: signal_of_nodes(law, bar, own[name]) for name, (_, bar) in bars.items()}
-        responses = [response(angle, signal.transmitted, float(angle[0])) for signal in found.values()]
-        errors, slopes = [], []
-        for name, (_, bar) in bars.items():
-            # Over the whole motion: the law's error grows with what changes.
-            ends = [features(bar.shape, bar.legs(*own[name][i])) for i in (angle.argmin(), angle.argmax())]
-            errors.append(law.error(ends[1] - ends[0]) / float(np.ptp(angle)))
-            slopes.append(_by_cell(law, bar, study.anchors))
-        names = tuple(bars)
-        solved, bounds = study.ranking.J_hat_mm, study.ranking.at_least_mm
-        J, known = np.array([solved.get(n, bounds.get(n)) for n in names]), [name in solved for name in names]
-        best = names[int(np.where(known, J, np.inf).argmin())]
-        has_gravity = study.job.effects.has_gravity
-        checks = _checked(bars[best][1], own[best], angle, optics, has_gravity)
+    anchors = anchor_points(unit)
+    law = cached_law(unit.printed, optics, cache, update)
+    states = motion.solved
+    # The state without pressure comes first, whether or not a sample meets it.
+    still = next((s.u for s in states if not s.pressure_MPa), np.zeros_like(motion.mesh.nodes))
+    displacements = [still, *(s.u for s in states)]
+    tip = TipSection.of(motion.mesh)
+    angle = np.array([tip.angle_deg(u) + 0.0 for u in displacements])
+    joints = Joints.of(motion.mesh, anchors)
+    moved = [joints.moved(u) for u in displacements]
+    bars, without = _bars(unit, anchors)
+    own = {name: [(at[i], turned[i]) for at, turned in moved] for name, (i, _) in bars.items()}
+    found = {name: signal_of_nodes(law, bar, own[name]) for name, (_, bar) in bars.items()}
+    responses = [response(angle, signal.transmitted, float(angle[0])) for signal in found.values()]
+    errors, slopes = [], []
+    for name, (_, bar) in bars.items():
+        # Over the whole motion: the law's error grows with what changes.
+        ends = [features(bar.shape, bar.legs(*own[name][i])) for i in (angle.argmin(), angle.argmax())]
+        errors.append(law.error(ends[1] - ends[0]) / float(np.ptp(angle)))
+        slopes.append(_by_cell(law, bar, anchors))
+    names = tuple(bars)
+    solved, bounds = ranking.J_hat_mm, ranking.at_least_mm
+    J, known = np.array([solved.get(n, bounds.get(n)) for n in names]), [name in solved for name in names]
+    best = names[int(np.where(known, J, np.inf).argmin())]
+    checks = _checked(bars[best][1], own[best], angle, optics, has_gravity)
     sizes = [size for size in (2, 3) if size <= len(names)]
     sets = [best for size in sizes for best in best_sets(SPREAD * np.array(slopes), NOISE, size)]
     pairs = differential_pairs([r.sensitivity_per_deg for r in responses])
@@ -97,30 +98,28 @@ def _signals(study: Study, optics: Optics) -> Signals:
         sets=_named(names, sets),
         differential=_named(names, pairs),
     )
-    study.light = light
-    _write(study, light)
-    return light
+    return light, without
 
 
-def _bars(study: Study) -> dict[str, tuple[list[int], EmbeddedWaveguide]]:
-    """Anchors' numbers and waveguide of every candidate path; one without room is left out with a warning.
+def _bars(
+    unit: Unit, anchors: Array
+) -> tuple[dict[str, tuple[list[int], EmbeddedWaveguide]], dict[str, str]]:
+    """Anchors' numbers and waveguide of every candidate path, and why some have none, by name.
 
     Raises InputError if no path has room.
     """
-    unit = study.job.unit
-    found, why = {}, None
-    for window in study.windows:
+    found, without, why = {}, {}, None
+    for window in windows(len(anchors)):
         numbers = list(window.indices)
         try:
             bar = waveguide(unit, window)
         except InputError as error:
-            why = error
-            study.warn(f"The light signal along {window.name} is not available: {error.what}.")
+            why, without[window.name] = error, error.what
             continue
-        found[window.name] = numbers, embed_waveguide(bar, study.anchors[numbers], unit.printed)
+        found[window.name] = numbers, embed_waveguide(bar, anchors[numbers], unit.printed)
     if why is not None and not found:
         raise why
-    return found
+    return found, without
 
 
 def _checked(
@@ -167,30 +166,34 @@ def _by_cell(law: Law, bar: EmbeddedWaveguide, anchors: Array) -> Array:
     return -law.coefficients[CURVATURE_OF_WELLS] * np.histogram(wells, edges)[0]
 
 
-def _write(study: Study, found: Signals) -> None:
-    rows = []
-    for k, name in enumerate(found.names):
-        r = found.responses[k]
-        rows.append(
-            (
-                name,
-                f"{found.j_hat[k]:.9g}" if found.solved[k] else "",
-                f"{r.sensitivity_per_deg:.6g}",
-                f"{found.errors_per_deg[k]:.3g}",
-                f"{r.monotonic_deg[0]:.4g}",
-                f"{r.monotonic_deg[1]:.4g}",
-                f"{r.span:.6g}",
-                f"{found.at_rest[k]:.6g}",
-                "" if found.front[k] is None else int(bool(found.front[k])),
-            )
+COLUMNS = (
+    "path", "J_hat_mm", "sensitivity_per_deg", "its_error", "monotonic_from_deg", "monotonic_to_deg",
+    "span", "transmitted_at_rest", "pareto",
+)  # fmt: skip
+
+
+def rows(found: Signals) -> list[tuple[Any, ...]]:
+    """Rows of signals.csv."""
+    return [
+        (
+            name,
+            f"{found.j_hat[k]:.9g}" if found.solved[k] else "",
+            f"{r.sensitivity_per_deg:.6g}",
+            f"{found.errors_per_deg[k]:.3g}",
+            f"{r.monotonic_deg[0]:.4g}",
+            f"{r.monotonic_deg[1]:.4g}",
+            f"{r.span:.6g}",
+            f"{found.at_rest[k]:.6g}",
+            "" if found.front[k] is None else int(bool(found.front[k])),
         )
-    columns = [
-        "path", "J_hat_mm", "sensitivity_per_deg", "its_error", "monotonic_from_deg", "monotonic_to_deg",
-        "span", "transmitted_at_rest", "pareto",
-    ]  # fmt: skip
-    write_csv(study.folder / TABLE, columns, rows)
+        for k, (name, r) in enumerate(zip(found.names, found.responses, strict=True))
+    ]
+
+
+def figures(found: Signals) -> dict[str, Any]:
+    """Figures of summary.json."""
     by_name = dict(zip(found.names, found.responses, strict=True))
-    study.context.summary["light"] = {
+    return {
         "optics": attrs.asdict(found.optics),
         "law_rms": found.law.rms,
         "sensitivity_per_deg": {n: r.sensitivity_per_deg for n, r in by_name.items()},

@@ -1,131 +1,99 @@
-"""Model A: the motion of a study's unit without a sensor, each state from the cache where it is there."""
+"""Model A where contact or the wall's law has history: its motion instant by instant."""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from typing import TYPE_CHECKING, Any
 
 import attrs
 import numpy as np
 
+from ...errors import ConvergenceError, MuError
 from ...fem.equilibrium import Equilibrium
 from ...fem.state import State
 from ...fem.time_stepping import Instant, simulate_in_time
-from ...fem.trajectory import Trajectory, simulate
+from ...report.results import ContactHistory
 from ...run.cache import Cache, key
 from .contact_history import history
-from .expected import work
+from .mechanics import Mechanics, Samples
 
 if TYPE_CHECKING:
     from ...fem.model import Model
-    from ...report.results import ContactHistory
-    from .job import Job
 
 Array = np.ndarray[Any, Any]
 
 
-def solve_model_a(
-    job: Job,
-    cache: Cache,
-    model: Model,
-    samples: tuple[Array, Array],
-    on_progress: Callable[[float, str], None],
-    on_state: Callable[[State], None] = lambda _: None,
-) -> tuple[Trajectory, ContactHistory | None]:
-    """Motion of a model at samples of time (k,) in s and pressure (k,) in kPa, and contacts with obstacles.
+@attrs.frozen(eq=False)
+class InTime:
+    """A motion instant by instant, as far as it was found; error: why not to its end.
 
-    on_progress: called with the finished share and a text on each state, before on_state. Raises
-    ConvergenceError.
+    remembered: what the wall's law remembers at each instant; lost_mJ: what friction of the unit on itself
+    has dissipated.
     """
-    if job.in_time:
-        return _in_time(job, cache, model, samples, on_progress, on_state)
-    time, pressure = samples
-    materials = job.materials(model.mesh)
-    # A state's last digits depend on the pressures visited before it.
-    visited = np.unique(pressure)
-    name = key(model.mesh.hash(), materials.hash(), visited, job.newton, *job.effects.parts)
-    total, done = work(job, visited), 0.0
-    body = Equilibrium(model, materials, job.newton)
 
-    def keep(state: State) -> None:
-        nonlocal done
-        done += work(job, [state.pressure_kPa])
-        least, _ = model.smallest_jacobian(state.u, body.parameters)
-        words = f"{state.pressure_kPa:.4g} kPa, residual {state.residual:.1e}"
-        words += f", {state.iterations} iterations, smallest det F {least:.2f}"
-        on_progress(done / total if total else 1.0, words)
-        on_state(state)
+    states: tuple[State, ...]
+    contact: ContactHistory | None
+    remembered: tuple[tuple[Array, ...], ...]
+    lost_mJ: float = 0.0
+    error: MuError | None = None
 
-    def load(pressure_MPa: float) -> State | None:
-        found = _entry(cache, "state", key(name, pressure_MPa), model)
-        return None if found is None else _state(found)
-
-    def store(state: State) -> None:
-        cache.put("state", key(name, state.pressure_MPa), attrs.asdict(state, recurse=False))
-
-    return simulate(body, time, pressure, keep, load=load, store=store), None
+    @property
+    def complete(self) -> bool:
+        """True if the motion was found to its end."""
+        return self.error is None
 
 
-def _in_time(
-    job: Job,
+def solve_in_time(
+    mechanics: Mechanics,
+    equilibrium: Equilibrium,
+    samples: Samples,
     cache: Cache,
-    model: Model,
-    samples: tuple[Array, Array],
     on_progress: Callable[[float, str], None],
-    on_state: Callable[[State], None],
-) -> tuple[Trajectory, ContactHistory | None]:
-    """Motion instant by instant, since contact or wall has history."""
-    time, pressure = samples
-    name = _in_time_key(job, model, samples)
-    contacts = []
+) -> InTime:
+    """Motion of a unit without a sensor through a protocol; each instant is kept in the cache.
+
+    on_progress: called with the finished share and a text on each state.
+    """
+    model, time = equilibrium.model, samples.time_s
+    friction = [o.friction for o in mechanics.obstacles]
+    stiff = [(o.depth_mm, o.stiffness, o.stick_stiffness) for o in model.obstacles]
+    name = key(
+        model.mesh.hash(), mechanics.hash(), time, samples.pressure_kPa, mechanics.newton, stiff, friction
+    )
+    contacts, states = [], list[State]()
+    remembered = list[tuple[Array, ...]]()
 
     def keep(state: State) -> None:
+        states.append(state)
         contacts.append([o.contact(state.u) for o in model.obstacles])
         words = f"{state.pressure_kPa:.4g} kPa"
-        if job.obstacles:
+        if model.obstacles:
             force = sum(float(np.linalg.norm(c.force_N)) for c in contacts[-1])
             words += f", contact {force:.3g} N"
-        on_progress(len(contacts) / len(time), words)
-        on_state(state)
+        on_progress(len(states) / len(time), words)
 
-    motion = simulate_in_time(
-        Equilibrium(model, job.materials(model.mesh), job.newton),
-        time,
-        pressure,
-        keep,
-        load=lambda number: _instant(cache, key(name, number), model),
-        store=lambda number, instant: cache.put("instant", key(name, number), _arrays(instant)),
-    )
-    touched = history(job.obstacles, model.mesh, time, pressure, contacts) if job.obstacles else None
-    return motion, touched
+    def load(number: int) -> Instant | None:
+        found = _instant(cache, key(name, number), model)
+        if found is not None:
+            remembered.append(found.history)
+        return found
 
+    def store(number: int, instant: Instant) -> None:
+        remembered.append(instant.history)
+        cache.put("instant", key(name, number), _arrays(instant))
 
-def history_of_wall(job: Job, cache: Cache, model: Model) -> Callable[[int], Sequence[Array]]:
-    """Function of an instant's number that returns the wall's history there; empty for an elastic one."""
-    if not job.unit.wall.has_memory:
-        return lambda number: ()
-    name = _in_time_key(job, model, job.samples)
-
-    def remembered(number: int) -> Sequence[Array]:
-        kept = _instant(cache, key(name, number), model)
-        return () if kept is None else kept.history
-
-    return remembered
-
-
-def _in_time_key(job: Job, model: Model, samples: tuple[Array, Array]) -> str:
-    parts: list[Any] = [(o.depth_mm, o.stiffness, o.stick_stiffness, o.friction) for o in model.obstacles]
-    if job.self_friction:
-        parts.append(job.self_friction)
-    return key(
-        model.mesh.hash(),
-        job.materials(model.mesh).hash(),
-        *samples,
-        job.newton,
-        job.obstacles_text() or "",
-        parts,
-        *job.effects.parts,
-    )
+    error = None
+    try:
+        simulate_in_time(equilibrium, time, samples.pressure_kPa, keep, load=load, store=store)
+    except ConvergenceError as found:
+        error = found
+    count = len(states)
+    met = mechanics.obstacles
+    touched = history(met, model.mesh, time[:count], samples.pressure_kPa[:count], contacts) if met else None
+    itself = model.self_contact
+    # Of the whole unit, as the forces are.
+    lost = 2.0 ** len(model.mesh.symmetry) * itself.lost_mJ if itself and mechanics.self_friction else 0.0
+    return InTime(tuple(states), touched, tuple(remembered[:count]), lost, error)
 
 
 def _arrays(instant: Instant) -> dict[str, Any]:
@@ -139,8 +107,8 @@ def _arrays(instant: Instant) -> dict[str, Any]:
 
 
 def _instant(cache: Cache, name: str, model: Model) -> Instant | None:
-    found = _entry(cache, "instant", name, model)
-    if found is None:
+    found = cache.get("instant", name)
+    if found is None or found.get("u", np.empty(0)).shape != model.mesh.nodes.shape:
         return None
     contacts = [
         {part.partition(" ")[2]: a for part, a in found.items() if part.startswith(f"{number} ")}
@@ -148,13 +116,6 @@ def _instant(cache: Cache, name: str, model: Model) -> Instant | None:
     ]
     memory = tuple(found[f"history {n}"] for n in range(len(found)) if f"history {n}" in found)
     return Instant(float(found["time_s"]), _state(found), found.get("rate"), tuple(contacts), memory)
-
-
-def _entry(cache: Cache, kind: str, name: str, model: Model) -> dict[str, Array] | None:
-    """Entry of the cache on a state of a model's mesh, or None."""
-    found = cache.get(kind, name)
-    fits = found is not None and found.get("u", np.empty(0)).shape == model.mesh.nodes.shape
-    return found if fits else None
 
 
 def _state(arrays: dict[str, Array]) -> State:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from typing import TYPE_CHECKING, Any
 
 from ...design.quantity import in_kPa
@@ -10,63 +10,64 @@ from ...fem.self_intersection import first_self_intersection
 from ...fem.state import State, rest
 
 if TYPE_CHECKING:
+    from ...fem.protocol import Protocol
     from ...meshing.mesh import Mesh
-    from .job import Job
+    from .mechanics import Samples
 
 
-# With self-contact, refine 0.7: docs/engineering/verification.md, the paper.
-def doubts_of_job(job: Job) -> Iterator[str]:
-    """Warnings on the omissions of a simulation's settings."""
-    # Uniform samples miss the protocol's extremes.
-    corners, samples = job.driven.pressure_kPa, job.supplied_kPa
-    for extreme, met in ((corners.min(), samples.min()), (corners.max(), samples.max())):
-        if abs(extreme - met) > 1e-6:
+def doubts_of_protocol(protocol: Protocol, samples: Samples) -> Iterator[str]:
+    """Warnings on what a protocol's samples leave out: uniform ones miss its extremes."""
+    corners, met = protocol.pressure_kPa, samples.supplied_kPa
+    for extreme, nearest in ((corners.min(), met.min()), (corners.max(), met.max())):
+        if abs(extreme - nearest) > 1e-6:
             yield (
-                f"The protocol goes to {extreme:g} kPa, but its {job.times} samples reach only "
-                f"{met:g} kPa: choose a number of samples that includes its extremes."
+                f"The protocol goes to {extreme:g} kPa, but its {len(met)} samples reach only "
+                f"{nearest:g} kPa: choose a number of samples that includes its extremes."
             )
 
 
-def doubts_of_motion(job: Job, mesh: Mesh, states: Sequence[State], summary: dict[str, Any]) -> Iterator[str]:
-    """Warnings on a motion's states; their figures go into the summary."""
-    yield from _walls_cross(job, mesh, states, summary)
-    yield from _snaps(job, states)
-    most = summary.get("nearest_to_break", {})
-    if most.get("percent", 0.0) > 100.0:
-        x, y, z = most["place_mm"]
-        yield (
-            f"The {most['part']} near ({x:g}, {y:g}, {z:g}) mm would tear: at {most['pressure_kPa']:g} kPa "
-            f"the stretch takes {most['percent']:.3g} % of the resin's elongation at break, "
-            f"{100 * job.unit.material.elongation_at_break:g} %. Lower the pressure or thicken that part."
-        )
+def would_tear(most: Mapping[str, Any], elongation: float) -> str:
+    """Warning of the largest share of a resin's elongation at break, a ratio; "" if it is below 100 %."""
+    if most.get("percent", 0.0) <= 100.0:
+        return ""
+    x, y, z = most["place_mm"]
+    return (
+        f"The {most['part']} near ({x:g}, {y:g}, {z:g}) mm would tear: at {most['pressure_kPa']:g} kPa "
+        f"the stretch takes {most['percent']:.3g} % of the resin's elongation at break, "
+        f"{100 * elongation:g} %. Lower the pressure or thicken that part."
+    )
 
 
-def _walls_cross(job: Job, mesh: Mesh, states: Sequence[State], summary: dict[str, Any]) -> Iterator[str]:
-    """The first pressure, on either side, at which walls pass through each other, and which."""
-    found = summary["walls_cross_at_kPa"] = {}
-    # With self-contact no step passes a touch.
-    for sign in () if job.self_contact else (-1, 1):
+# With self-contact, refine 0.7: docs/engineering/verification.md, the paper.
+def crossings(mesh: Mesh, states: Sequence[State]) -> dict[str, tuple[str, ...]]:
+    """Walls that pass through each other at the first such pressure in kPa, on either side of 0, by that."""
+    found = {}
+    for sign in (-1, 1):
         outward = sorted((s for s in states if s.pressure_MPa * sign > 0), key=lambda s: abs(s.pressure_MPa))
         still = [s for s in states if s.loaded and not s.pressure_MPa]
         first = first_self_intersection(mesh, [rest(mesh), *still, *outward])
-        if first is None:
-            continue
-        pressure = f"{in_kPa(first.pressure_MPa):.4g}"
-        found[pressure] = [str(c) for c in first.crossings]
+        if first is not None:
+            found[f"{in_kPa(first.pressure_MPa):.4g}"] = tuple(str(c) for c in first.crossings)
+    return found
+
+
+def walls_cross(found: Mapping[str, Sequence[str]]) -> Iterator[str]:
+    """Warnings of `crossings`."""
+    for pressure, walls in found.items():
         yield (
-            f"From {pressure} kPa on, walls intersect: {first.crossings[0]}. Self-contact is not "
+            f"From {pressure} kPa on, walls intersect: {walls[0]}. Self-contact is not "
             f"modelled, so states beyond this pressure are invalid. Use a thicker wall, --self-contact or a "
             "smaller pressure."
         )
 
 
-def _snaps(job: Job, states: Sequence[State]) -> Iterator[str]:
+def snaps(states: Sequence[State], in_time: bool) -> Iterator[str]:
     """The first pressure on either side beyond a limit point, and how far a node moved.
 
     For a motion solved instant by instant, the first instant.
     """
     snapped = [s for s in states if s.snapped_mm]
-    if job.in_time:
+    if in_time:
         ways = [snapped]
     else:
         outward = sorted(snapped, key=lambda s: abs(s.pressure_MPa))

@@ -2,58 +2,65 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
-from typing import TYPE_CHECKING, Any
+from collections.abc import Mapping
+from typing import Any
 
+import attrs
 import numpy as np
 
 from ...fem.kinematics import MIRROR
+from ...fem.state import State
 from ...meshing.mesh import Mesh, images
-from ...placement.candidates import Candidate
-from ...report.motion_files import IMAGE, REGIONS, SurfaceFields, surface_of, write_path
-
-if TYPE_CHECKING:
-    from pathlib import Path
-
-    from ...fem.trajectory import Trajectory
-    from .candidates_by_pressure import CandidateSolver
-    from .job import Job
+from ...report.motion_files import IMAGE, REGIONS, SurfaceFields, surface_of
+from .mechanics import Mechanics
 
 Array = np.ndarray[Any, Any]
 
 
-def keep_motion(
-    job: Job,
-    folder: Path,
-    own: Mesh,
-    mesh: Mesh,
-    trajectory: Trajectory,
-    solver: CandidateSolver,
-    every: Sequence[Candidate],
-    on_progress: Callable[[float], None],
-) -> None:
-    """Write the motion of every path whose displacement a sweep on a mesh has kept. Raises OutputError.
+@attrs.frozen(eq=False)
+class PathMotion:
+    """Difference (r, n, 3) in mm of a path's unit from Model A at pressures (r,) in kPa, and of its fields.
 
-    own: the study's mesh; mesh: the same, or its `mirror`, the whole body's, if that is a half. on_progress:
-    called with the finished share.
+    fields: by the names of `report.motion_files`.
     """
-    image = None if mesh.symmetry == own.symmetry else images(own, "x")
-    nodes = {region: surface_of(own, number).node for region, number in REGIONS.items()}
-    both = {r: n if image is None else np.concatenate([n, image[n]]) for r, n in nodes.items()}
-    looked, materials = SurfaceFields(mesh, both), job.materials(mesh)
-    by_pressure = {state.pressure_kPa: state.u for state in trajectory.solved}
-    without: dict[str, Array] = {}
-    for number, (name, pressure_kPa, difference_mm) in enumerate(solver.whole(trajectory)):
-        still = [by_pressure[p] for p in pressure_kPa]
-        without = without or looked.of_states(still, materials)
-        moved = [u + apart for u, apart in zip(still, difference_mm, strict=True)]
-        fields = {key: values - without[key] for key, values in looked.of_states(moved, materials).items()}
+
+    pressure_kPa: Array
+    difference_mm: Array
+    fields: dict[str, Array]
+
+
+class PathMotions:
+    """Motions of paths on a mesh, for display on a study's own.
+
+    own: the study's mesh; mesh: the same, or its mirror, the whole body's, if that is a half; states: Model
+    A's on it by pressure in kPa.
+    """
+
+    def __init__(self, mechanics: Mechanics, own: Mesh, mesh: Mesh, states: Mapping[float, State]) -> None:
+        self._own, self._states = own, states
+        self._image = None if mesh.symmetry == own.symmetry else images(own, "x")
+        self._nodes = {region: surface_of(own, number).node for region, number in REGIONS.items()}
+        image = self._image
+        both = {r: n if image is None else np.concatenate([n, image[n]]) for r, n in self._nodes.items()}
+        self._looked, self._materials = SurfaceFields(mesh, both), mechanics.materials(mesh)
+        self._without: dict[float, dict[str, Array]] = {}
+
+    def of(self, difference_mm: Mapping[float, Array]) -> PathMotion:
+        """Motion of a path from its differences (n, 3) in mm on the mesh, by pressure in kPa."""
+        pressures = sorted(difference_mm)
+        for p in pressures:
+            if p not in self._without:
+                self._without[p] = self._looked.of_states([self._states[p].u], self._materials)
+        apart = np.array([difference_mm[p] for p in pressures])
+        moved = [self._states[p].u + d for p, d in zip(pressures, apart, strict=True)]
+        still = [self._without[p] for p in pressures]
+        found = self._looked.of_states(moved, self._materials)
+        fields = {name: v - np.concatenate([one[name] for one in still]) for name, v in found.items()}
         further = {}
-        if image is not None:
-            further["image_mm"] = difference_mm[:, image] * MIRROR
-            for key, values in fields.items():
-                count = len(nodes[key.partition("_")[0]])
-                fields[key], further[IMAGE + key] = values[:, :count], values[:, count:]
-            difference_mm = difference_mm[:, : len(own.nodes)]
-        write_path(folder, name, pressure_kPa, difference_mm, **fields, **further)
-        on_progress((number + 1) / len(every))
+        if self._image is not None:
+            further["image_mm"] = apart[:, self._image] * MIRROR
+            for name, values in fields.items():
+                count = len(self._nodes[name.partition("_")[0]])
+                fields[name], further[IMAGE + name] = values[:, :count], values[:, count:]
+            apart = apart[:, : len(self._own.nodes)]
+        return PathMotion(np.array(pressures), apart, {**fields, **further})

@@ -3,19 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import attrs
 import numpy as np
 
 from ...errors import ConvergenceError
-from ...files import write_csv, write_npz
 from ...placement.candidates import Candidate, Evaluation
 from ...placement.deviation import rank
-
-if TYPE_CHECKING:
-    from .job import Job
 
 Array = np.ndarray[Any, Any]
 
@@ -32,16 +27,18 @@ COLUMNS = [
 ]
 
 
-@attrs.define
+@attrs.frozen(eq=False)
 class Ranking:
     """Evaluations of candidates by path, and the mesh uncertainty of J_hat in mm; None: not known.
 
-    at_least_mm: lower bound of J_hat of paths that were not solved further, since they cannot be the best.
+    at_least_mm: lower bound of J_hat of paths that were not solved further, since they cannot be the best;
+    not_reached: pressures or instants that are not compared, and why.
     """
 
     evaluations: dict[str, Evaluation] = attrs.field(factory=dict)
     uncertainty_mm: float | None = None
     at_least_mm: dict[str, float] = attrs.field(factory=dict)
+    not_reached: tuple[str, ...] = ()
 
     @property
     def compared(self) -> Array:
@@ -66,30 +63,24 @@ class Ranking:
         return [name for name, value in J.items() if name != best and value - J[best] < limit]
 
     @property
-    def may_be_tied(self) -> list[str]:
-        """Paths not solved further that the mesh uncertainty does not tell from the chosen one."""
-        limit = self.J_hat_mm[self.chosen] + (self.uncertainty_mm or 0.0)
-        return [name for name, bound in self.at_least_mm.items() if bound < limit]
-
-    @property
     def rank(self) -> dict[str, int]:
         """Rank from 1 of each path whose J_hat is known and below all bounds of the others."""
         J, least = self.J_hat_mm, min(self.at_least_mm.values(), default=np.inf)
         ranks = dict(zip(J, rank(np.array([*J.values()])).tolist(), strict=True))
         return {name: place for name, place in ranks.items() if J[name] <= least}
 
-    def best(self, candidates: Sequence[Candidate], count: int) -> list[Candidate]:
-        """The `count` candidates of least J_hat, the best first."""
+    def best(self, count: int) -> list[str]:
+        """The `count` solved paths of least J_hat, the best first."""
         J = self.J_hat_mm
-        return sorted((c for c in candidates if c.name in J), key=lambda one: J[one.name])[:count]
+        return sorted(J, key=lambda name: J[name])[:count]
 
-    def write(self, folder: Path, job: Job, paths: Sequence[Candidate]) -> dict[str, Any]:
-        """Write deviation.csv and delta.npz; return the figures of the summary. Raises OutputError."""
+    def rows(self, paths: Sequence[Candidate]) -> list[tuple[Any, ...]]:
+        """Rows of deviation.csv."""
         found = {c.name: self.evaluations[c.name].deviation for c in paths if c.name in self.evaluations}
         # One uncertainty for all: the largest change of a path's J_hat on another mesh.
         mesh = "" if self.uncertainty_mm is None else f"{self.uncertainty_mm:.3g}"
         ties = {name: "yes" if name in self.tied else "no" for name in found} if mesh else {}
-        rows = []
+        rows: list[tuple[Any, ...]] = []
         for c in paths:
             if (d := found.get(c.name)) is not None:
                 figures = f"{d.J_hat:.9g}", f"{d.J_cont:.9g}", self.rank.get(c.name, ""), mesh
@@ -97,23 +88,7 @@ class Ranking:
             else:
                 bound = f"{self.at_least_mm[c.name]:.9g}"
                 rows.append((c.name, c.start, c.length, "", "", "", "", "no" if mesh else "", bound))
-        write_csv(folder / "deviation.csv", COLUMNS, rows)
-        arrays = {
-            "delta_mm": np.array([d.delta for d in found.values()]),
-            "path": np.array([*found]),
-            "time_s": job.samples[0],
-            "pressure_kPa": job.supplied_kPa,
-            "station": np.linspace(0, 1, job.stations),
-        }
-        write_npz(folder / "delta.npz", arrays)
-        return {
-            "J_hat_mm": {name: d.J_hat for name, d in found.items()},
-            "J_cont_mm": {name: d.J_cont for name, d in found.items()},
-            "J_hat_at_least_mm": self.at_least_mm,
-            "chosen": self.chosen,
-            "mesh_uncertainty_mm": self.uncertainty_mm,
-            "tied_with_chosen": self.tied,
-        }
+        return rows
 
 
 def mesh_change_mm(

@@ -5,8 +5,12 @@ No solver or array library is loaded: the command line's --help reads this modul
 
 from __future__ import annotations
 
+from collections.abc import Mapping
+from typing import Any
+
 from ...design.quantity import described
 from ...design.settings import ORIENTATION as HUNG
+from ...meshing.settings import REFINE
 
 STAGES = ("design", "simulate", "place")
 """Stages in order of need; a study has the first, the first two or all."""
@@ -55,3 +59,19 @@ SELF_FRICTION = described(
     high=5,
 )
 ORIENTATION = HUNG._replace(text=f"{HUNG.text}; it has an effect only with gravity in the extended model")
+ESTIMATED = "J_hat_estimated_mm"
+"""Key of summary.json for estimates of J_hat by path, before any is solved."""
+
+
+def left_out(tables: Mapping[str, Mapping[str, Any]]) -> str:
+    """What the figures of a quick ranking leave out, as text; empty for another study.
+
+    tables: of study.toml, by stage.
+    """
+    motion, ranking = tables.get("simulate", {}), tables.get("place", {})
+    if not motion.get(UNDER_PRESSURE.name):
+        return ""
+    coarse = motion["mesh"]["refine"] < REFINE.default
+    unchecked = not ranking.get(MESH_CHECK.name, True)
+    words = "under pressure alone", "coarse mesh" * coarse, "no mesh check" * unchecked
+    return ", ".join(filter(None, words))

@@ -30,12 +30,14 @@ from ...run.cache import key
 from ...run.folder import ALWAYS, OWN
 from ...run.lock import LOCK, FolderLock, holder
 from ...toml_writer import toml_text
-from . import study_file
-from .settings import STAGES
-from .study_file import FILES, LAYOUT, NAME, Tables
+from .settings import STAGES, left_out
 
 if TYPE_CHECKING:
-    from .job import Job
+    from ...studies.unit_ranking import UnitStudy
+
+Tables = dict[str, dict[str, Any]]
+NAME = "study.toml"
+BODY, OBSTACLES = "body.obj", "obstacles.obj"
 
 RUNS, LABEL = "runs", "label.toml"
 HOME, STALE = "home", "stale"
@@ -138,7 +140,7 @@ class Run:
     @property
     def left_out(self) -> str:
         """What a quick ranking leaves out, as text; empty for another run."""
-        return study_file.left_out(self.tables)
+        return left_out(self.tables)
 
     @property
     def seconds(self) -> float:
@@ -173,6 +175,12 @@ class Run:
         return {name: float(bound) for name, bound in found.items()}
 
 
+def _kind() -> type[UnitStudy]:
+    from ...studies.unit_ranking import UnitStudy
+
+    return UnitStudy
+
+
 def design_key(
     unit: Unit, body: str, obstacles: Iterable[tuple[str, float]], effects: Mapping[str, Any]
 ) -> str:
@@ -203,7 +211,7 @@ def folders(home: Path) -> list[Path]:
 
 def files_of(folder: Path) -> list[Path]:
     """Files that a run is read from, its inputs first."""
-    names = (NAME, SUMMARY, LABEL, "unit.toml", FILES["body"], FILES["obstacles"])
+    names = (NAME, SUMMARY, LABEL, "unit.toml", BODY, OBSTACLES)
     return [folder / name for name in names]
 
 
@@ -225,17 +233,15 @@ def ordered(found: Iterable[Run]) -> list[Run]:
 
 def read_run(folder: Path) -> Run:
     """The run in a folder. Raises InputError and OSError where it cannot be read."""
-    tables = study_file.read(folder)
-    if tables is None:
-        raise InputError("this folder contains no run", str(folder), "give a folder that holds study.toml")
-    unit = read_unit(folder / FILES["unit"])
+    tables, _, _ = _kind().read_tables(folder / NAME)
+    unit = read_unit(folder / "unit.toml")
     asked = tables.get("simulate", {})
     body = ""
     if "body" in tables["design"]:
-        body = hashlib.sha256(file_bytes(folder / FILES["body"], MOST_BYTES)).hexdigest()
+        body = hashlib.sha256(file_bytes(folder / BODY, MOST_BYTES)).hexdigest()
     obstacles = []
     if "obstacles" in asked:
-        met = read_rigid_bodies(folder / FILES["obstacles"], asked.get("friction"))
+        met = read_rigid_bodies(folder / OBSTACLES, asked.get("friction"))
         obstacles = [(rigid.body.hash, rigid.friction) for rigid in met]
     summary: Any = {}
     latest = folder / NAME
@@ -273,13 +279,13 @@ def best_of(found: Sequence[Run], design: str) -> Run | None:
     return next(iter(ordered(others or own)), None)
 
 
-def place_of(home: Path, job: Job) -> tuple[Path, Job]:
+def place_of(home: Path, job: UnitStudy) -> tuple[Path, UnitStudy]:
     """Folder of a unit's home in which a job is run, and the job with the name that its unit has there.
 
     Runs of the same inputs share it, also with fewer or more stages: finished stages are kept, and renaming
     makes no result stale.
     """
-    own = _tables(job.tables(), job.unit)
+    own = _tables(job.tables, job.unit)
     for run in runs(home):
         theirs = _tables(run.tables, run.unit)
         if run.key != STALE and all(own[stage] == theirs[stage] for stage in own if stage in theirs):
@@ -337,7 +343,8 @@ def _own(run: Run) -> list[Path]:
     """Files and folders of a run: its whole folder, or in the home folder those that a study writes."""
     if run.key != HOME:
         return sorted(run.folder.iterdir())
-    names = (NAME, *LAYOUT.optional, *LAYOUT.results, *ALWAYS, *OWN, LABEL, OUTPUTS)
+    layout = _kind().layout()
+    names = (NAME, *layout.optional, *layout.results, *ALWAYS, *OWN, LABEL, OUTPUTS)
     found = {path for name in names if name not in (LOCK, STALE) for path in run.folder.glob(name)}
     return sorted(found)
 

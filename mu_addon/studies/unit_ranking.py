@@ -1,0 +1,784 @@
+"""A unit's design, motion and ranking of sensor paths, in one folder: `design`, `simulate` and `place`."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+from functools import cached_property
+from typing import Any
+
+import attrs
+
+from .. import design, fem, meshing, placement
+from ..placement.settings import BEND, LONGEST, SHORTEST
+from ..run.parts import Part, Sentence, Warn, recorded
+from ..run.study import (
+    Dropped,
+    Growth,
+    Members,
+    Over,
+    Tell,
+    given,
+    grown,
+    intermediate,
+    section,
+    setting,
+    stage,
+)
+from ..sensing.optics import Optics
+from ..usecases import simulate_and_place as core
+from ..usecases.simulate_and_place.settings import (
+    ALL_PATHS,
+    CHECKS,
+    MESH_CHECK,
+    PATHS,
+    QUICK,
+    QUICK_REFINE,
+    STATIONS,
+)
+from .inputs import OnceInput
+from .unit_inputs import OpticsInput
+from .unit_motion import SOLVER, UnitMotion, taking, told
+
+LATTICE = "paths, and limits of --paths graph"
+COARSER = 0.7
+"""Refinement of a coarser mesh, by which the mesh uncertainty of a ranking is estimated, over its own."""
+PATHS_CHECKED = 3
+"""The best paths, which the coarser mesh solves too: only paths near the best can be tied with it."""
+
+
+def _places(study: UnitStudy) -> bool:
+    return "place" in study.stages
+
+
+def _by_pressure(study: UnitStudy) -> bool:
+    return "place" in study.stages and not study.in_time
+
+
+def _in_time(study: UnitStudy) -> bool:
+    return "place" in study.stages and study.in_time
+
+
+def _checks_by_pressure(study: UnitStudy) -> bool:
+    return _by_pressure(study) and study.mesh_check
+
+
+def _checks_in_time(study: UnitStudy) -> bool:
+    return _in_time(study) and study.mesh_check
+
+
+def _searches(study: UnitStudy) -> bool:
+    return "place" in study.stages and study.paths == "graph"
+
+
+def _under_pressure(study: UnitStudy) -> list[float]:
+    return [p for p in study.samples.distinct_kPa if p > 0.0]
+
+
+def _way(study: UnitStudy, member: core.Member) -> Mapping[str, Any]:
+    """Model A's states from rest to those that a candidate is solved at."""
+    every = {p for pressure in member[1] for p in (study.samples.outward(pressure) or [pressure])}
+    return {"states": [p for p in study.samples.distinct_kPa if p in every]}
+
+
+def _extremes(study: UnitStudy, first_ranking: core.Ranking) -> Growth:
+    yield core.extremes(study.samples.pressure_kPa[first_ranking.compared]).tolist()
+
+
+def _best_on_coarse(study: UnitStudy, first_ranking: core.Ranking) -> Growth:
+    chosen = core.extremes(study.samples.pressure_kPa[first_ranking.compared]).tolist()
+    yield [(name, tuple(chosen)) for name in first_ranking.best(PATHS_CHECKED)]
+
+
+def _best_in_time(study: UnitStudy, first_ranking: core.Ranking) -> Growth:
+    yield first_ranking.best(PATHS_CHECKED)
+
+
+@attrs.frozen(kw_only=True, eq=False)
+class UnitStudy(UnitMotion):
+    """A unit's printable solid, its motion without a sensor, and the ranking of sensor paths."""
+
+    name = "place"
+    commands = {
+        "design": (
+            "Generate the printable solid of a unit: STL file and lattice nodes.",
+            "design --preset mu-1.0x --path alpha4 --out out/mu-1.0x",
+        ),
+        "simulate": (
+            "Run `design`, then simulate the unit's motion under a pressure protocol: the stage Model A, "
+            "without a sensor.",
+            "simulate --preset mu-1.0x --refine 0.5 --out out/mu-1.0x",
+        ),
+        "place": (
+            "Run `design` and `simulate`, then rank the sensor paths by how much each disturbs the motion of "
+            "Model A, the unit without a sensor (the main job).",
+            "place --preset mu-1.0x --refine 0.5 --out out/mu-1.0x",
+        ),
+    }
+    files = {
+        **UnitMotion.files,
+        "deviation.csv": "deviation and rank of every path, its mesh uncertainty and ties",
+        "delta.npz": "deviation over time and length of every path, mm",
+        "sensitivity.vtu": "sensitivity of the deviation to the stiffness of each element, mm (ParaView)",
+        "signals.csv": "light signal of each path, and its deviation",
+        "paths.csv": "every path of the lattice: length, predicted and, where it was solved, exact deviation",
+    }
+
+    quick: bool = given(OnceInput(descriptions=(QUICK,), target="place"), default=False)
+    stations: int = setting(STATIONS, metavar="J", group=SOLVER, target="place")
+    mesh_check: bool = setting(MESH_CHECK, group=SOLVER, target="place")
+    all_paths: bool = setting(ALL_PATHS, decides=False, group=SOLVER, target="place")
+    paths: str = setting(PATHS, group=LATTICE, target="place")
+    optics: Optics = given(OpticsInput(group=LATTICE), factory=Optics)
+    shortest_cells: float = setting(SHORTEST, metavar="C", group=LATTICE, target="place")
+    longest_cells: float = setting(LONGEST, metavar="C", group=LATTICE, target="place")
+    bend_deg: float = setting(BEND, metavar="A", group=LATTICE, target="place")
+    checks: int = setting(CHECKS, metavar="N", group=LATTICE, target="place")
+
+    def refusals(self) -> Iterator[tuple[bool, str, str, str]]:
+        """Pairs of settings that exclude each other, and a body that its paths leave."""
+        yield from super().refusals()
+        places = "place" in self.stages
+        graph = places and self.paths == "graph"
+        without, one = "the search of the whole lattice does not support", "leave one of them out"
+        yield graph and bool(self.obstacles), f"{without} obstacles", "obstacles, paths", one
+        yield graph and bool(self.self_friction), f"{without} friction", "--self-friction, --paths graph", one
+        yield (
+            graph and self.unit.wall.has_memory,
+            f"{without} a wall with memory",
+            "[wall], paths",
+            "rank the windows of anchors, or use an elastic law",
+        )
+        clogged = graph and bool(self.effects.clogged)
+        yield clogged, f"{without} a clogged chamber", "clogged_chamber, paths", one
+        yield (
+            graph and self.body is not None,
+            "the search of the whole lattice supports only the default box of the lattice",
+            "--body, --paths graph",
+            one,
+        )
+        if places and self.body is not None and not graph:
+            from ..design.body import require_path_inside
+
+            for window in self.windows:
+                require_path_inside(self.body, self.unit, window)
+
+    def complete(self) -> UnitStudy:
+        """The study as it is run: a quick one solves less, and its figures say what they leave out."""
+        if not self.quick:
+            return self
+        mesh = attrs.evolve(self.mesh, refine=min(self.mesh.refine, QUICK_REFINE))
+        return attrs.evolve(self, mesh=mesh, mesh_check=False, under_pressure=True, quick=False)
+
+    def require_possible(self) -> None:
+        """Raise InputError for what cannot be placed, before an hour's work and not after."""
+        if "place" in self.stages:
+            core.require_paths(self.unit, self.body, self.limits if self.paths == "graph" else None)
+
+    # What follows from the inputs.
+
+    @property
+    def windows(self) -> list[design.Window]:
+        """Windows of anchors of the candidate paths."""
+        return design.windows(self.unit.chambers.count)
+
+    @cached_property
+    def candidates_paths(self) -> tuple[placement.Candidate, ...]:
+        """The candidate paths."""
+        return tuple(placement.candidate_paths(design.anchor_points(self.unit), self.windows))
+
+    @property
+    def compared(self) -> core.Comparison:
+        """What candidates are compared at."""
+        names = tuple(one.name for one in self.candidates_paths)
+        return core.Comparison(names, self.samples, self.effects.has_gravity)
+
+    @property
+    def limits(self) -> placement.Limits:
+        """Limits of paths of the whole lattice."""
+        return placement.Limits(self.shortest_cells, self.longest_cells, self.bend_deg)
+
+    @property
+    def contest(self) -> Any:
+        """The paths whose deviation is to be known exactly: the best one, or those of the mesh check."""
+        from ..placement.elimination import Contest
+
+        return Contest(PATHS_CHECKED if self.mesh_check else 1, every=self.all_paths)
+
+    @property
+    def sensor(self) -> Any:
+        """The waveguide's parameters."""
+        return self.unit.waveguide
+
+    @property
+    def checked_as(self) -> meshing.MeshSettings:
+        """Settings of the mesh of the mesh check."""
+        settings = attrs.evolve(self.mesh, refine=self.mesh.refine * COARSER)
+        return self.mechanics.mesh_settings(settings)
+
+    # An estimate of the ranking.
+
+    @stage(
+        "Model A",
+        taking("Model A"),
+        over=Over(
+            ("what",), lambda study: ["estimate"], needs=lambda study, _: {"states": _under_pressure(study)}
+        ),
+        wanted=lambda study: (
+            _by_pressure(study) and len(study.candidates_paths) > 1 and bool(_under_pressure(study))
+        ),
+        parallel=True,
+        says=lambda found: core.words_on_estimates(found),
+    )
+    def estimates(
+        self,
+        what: str,
+        meshed: meshing.Mesh,
+        mechanics: core.Mechanics,
+        states: Members,
+        samples: core.Samples,
+        stations: int,
+        sensor: Any,
+    ) -> dict[str, float]:
+        """Deviation of every path in mm, long before it is solved; none of an unstable unit."""
+        return core.estimates(mechanics, meshed, list(states.values()), samples, stations)
+
+    # Candidates by pressure.
+
+    @intermediate()
+    def waveguides(
+        self, meshed: meshing.Mesh, mechanics: core.Mechanics, candidates_paths: Any, sensor: Any
+    ) -> Any:
+        """Solver of the candidates."""
+        return core.waveguides_of(mechanics, meshed, candidates_paths)
+
+    @stage(
+        "candidates",
+        taking("candidates"),
+        over=Over(
+            ("path", "pressures_kPa"),
+            lambda study: [],
+            _way,
+            grows=lambda study: core.solving(study.compared, study.contest),
+            most=lambda study: 2 * len(study.candidates_paths),
+        ),
+        wanted=_by_pressure,
+        parallel=True,
+        says=lambda found: core.words_on_solved(found),
+    )
+    def candidates(
+        self,
+        path: str,
+        pressures_kPa: tuple[float, ...],
+        states: Members,
+        waveguides: Any,
+        candidates_paths: Any,
+        stations: int,
+    ) -> core.Solved:
+        """A candidate at some pressures, from Model A's states there."""
+        number = [one.name for one in candidates_paths].index(path)
+        return core.solved(waveguides, number, pressures_kPa, states, stations)
+
+    @intermediate()
+    def standing(self, compared: core.Comparison, contest: Any, candidates: Members) -> core.Standing:
+        """Where the candidates stand once the contest is over."""
+        found: core.Standing = grown(core.solving(compared, contest), candidates)
+        return found
+
+    @stage(
+        "candidates",
+        taking("candidates"),
+        over=Over(
+            ("path", "pressures_kPa"),
+            lambda study: [],
+            grows=lambda study, standing: core.following(study.compared, standing),
+            after=("standing",),
+        ),
+        wanted=_by_pressure,
+        parallel=True,
+    )
+    def followed(
+        self, path: str, pressures_kPa: tuple[float, ...], waveguides: Any, candidates_paths: Any
+    ) -> core.Followed:
+        """A candidate along its whole path from rest."""
+        number = [one.name for one in candidates_paths].index(path)
+        return core.followed(waveguides, number, pressures_kPa)
+
+    @intermediate()
+    def path_check(
+        self, compared: core.Comparison, standing: core.Standing, followed: Members
+    ) -> core.PathCheck:
+        """Whether candidates from Model A's states end where their own paths do."""
+        found: core.PathCheck = grown(core.following(compared, standing), followed)
+        return found
+
+    # Candidates where history acts.
+
+    @stage(
+        "candidates",
+        taking("candidates"),
+        over=Over(("path",), lambda study: [one.name for one in study.candidates_paths]),
+        wanted=_in_time,
+        parallel=True,
+    )
+    def marched(self, path: str, waveguides: Any, candidates_paths: Any, samples: core.Samples) -> core.Array:
+        """Anchors (k, p, 3) in mm of a candidate at each instant, as far as it has an equilibrium."""
+        number = [one.name for one in candidates_paths].index(path)
+        return core.marched(waveguides, number, samples)
+
+    @intermediate(wanted=_places)
+    def first_ranking(
+        self,
+        motion: fem.Trajectory,
+        compared: core.Comparison,
+        mechanics: core.Mechanics,
+        stations: int,
+        standing: core.Standing | None = None,
+        path_check: core.PathCheck | None = None,
+        marched: Members | None = None,
+    ) -> core.Ranking:
+        """The ranking as far as the contest goes, without its mesh uncertainty."""
+        return core.ranked(motion, compared, mechanics, stations, standing, path_check, marched)
+
+    # The mesh check.
+
+    @stage(
+        "mesh check",
+        taking("mesh check"),
+        wanted=lambda study: _places(study) and study.mesh_check,
+        failing="The mesh uncertainty is not known: there is no coarser mesh",
+        parallel=True,
+    )
+    def coarse_mesh(
+        self,
+        shape: design.Unit,
+        has_memory: bool,
+        checked_as: meshing.MeshSettings,
+        body: design.Body | None,
+        tell: Tell,
+    ) -> meshing.Mesh:
+        """A coarser analysis mesh."""
+        return core.mesh_of(shape, has_memory, checked_as, body, tell.cache, tell)
+
+    @intermediate()
+    def coarse_equilibrium(self, coarse_mesh: meshing.Mesh, mechanics: core.Mechanics) -> fem.Equilibrium:
+        """Solver of the unit without a sensor on the coarser mesh."""
+        return mechanics.equilibrium(coarse_mesh)
+
+    @intermediate()
+    def coarse_waveguides(
+        self, coarse_mesh: meshing.Mesh, mechanics: core.Mechanics, candidates_paths: Any, sensor: Any
+    ) -> Any:
+        """Solver of the candidates on the coarser mesh."""
+        return core.waveguides_of(mechanics, coarse_mesh, candidates_paths)
+
+    @stage(
+        "mesh check",
+        taking("mesh check"),
+        over=Over(("pressure_kPa",), lambda study: [], grows=_extremes, after=("first_ranking",)),
+        wanted=_checks_by_pressure,
+        failing="The mesh uncertainty is not known at {pressure_kPa:g} kPa: on the coarser mesh",
+        parallel=True,
+        says=told,
+    )
+    def coarse_states(self, pressure_kPa: float, coarse_equilibrium: fem.Equilibrium) -> fem.State:
+        """The state at an extreme pressure, from rest."""
+        return core.state_after(coarse_equilibrium, pressure_kPa, [])
+
+    @stage(
+        "mesh check",
+        taking("mesh check"),
+        over=Over(
+            ("path", "pressures_kPa"),
+            lambda study: [],
+            lambda study, member: {"coarse_states": list(member[1])},
+            grows=_best_on_coarse,
+            after=("first_ranking",),
+        ),
+        wanted=_checks_by_pressure,
+        parallel=True,
+        says=lambda found: core.words_on_solved(found),
+    )
+    def coarse_candidates(
+        self,
+        path: str,
+        pressures_kPa: tuple[float, ...],
+        coarse_states: Members,
+        coarse_waveguides: Any,
+        candidates_paths: Any,
+        stations: int,
+    ) -> core.Solved:
+        """One of the best candidates at the extreme pressures that the coarser mesh reaches."""
+        number = [one.name for one in candidates_paths].index(path)
+        return core.solved(coarse_waveguides, number, [*coarse_states], coarse_states, stations, whole=False)
+
+    @stage(
+        "mesh check",
+        taking("mesh check"),
+        wanted=_checks_in_time,
+        failing="The mesh uncertainty is not known: on the coarser mesh",
+        kept=False,
+    )
+    def coarse_instants(
+        self,
+        coarse_equilibrium: fem.Equilibrium,
+        mechanics: core.Mechanics,
+        samples: core.Samples,
+        tell: Tell,
+    ) -> core.InTime:
+        """The motion instant by instant on the coarser mesh."""
+        from ..run.cache import Cache
+
+        found = core.solve_in_time(mechanics, coarse_equilibrium, samples, Cache(tell.cache), tell)
+        if found.error is not None:
+            raise found.error
+        return found
+
+    @stage(
+        "mesh check",
+        taking("mesh check"),
+        over=Over(("path",), lambda study: [], grows=_best_in_time, after=("first_ranking",)),
+        wanted=_checks_in_time,
+        failing="The mesh uncertainty is not known: on the coarser mesh",
+        parallel=True,
+    )
+    def coarse_marched(
+        self, path: str, coarse_waveguides: Any, candidates_paths: Any, samples: core.Samples
+    ) -> core.Array:
+        """Anchors (k, p, 3) in mm of one of the best candidates at each instant on the coarser mesh."""
+        number = [one.name for one in candidates_paths].index(path)
+        return core.marched(coarse_waveguides, number, samples)
+
+    @intermediate()
+    def uncertainty(
+        self,
+        first_ranking: core.Ranking,
+        samples: core.Samples,
+        stations: int,
+        anchors: Any,
+        coarse_mesh: meshing.Mesh | None = None,
+        coarse_candidates: Members | None = None,
+        coarse_states: Members | None = None,
+        coarse_instants: core.InTime | None = None,
+        coarse_marched: Members | None = None,
+    ) -> core.Uncertainty:
+        """Mesh uncertainty of J_hat, if it is known."""
+        return core.uncertainty(
+            first_ranking,
+            samples,
+            stations,
+            anchors,
+            coarse_mesh,
+            coarse_candidates,
+            coarse_states,
+            coarse_instants,
+            coarse_marched,
+        )
+
+    @stage(
+        "candidates",
+        taking("candidates"),
+        over=Over(
+            ("path", "pressures_kPa"),
+            lambda study: [],
+            _way,
+            grows=lambda study, standing, uncertainty: core.solving(
+                study.compared, core.widened(study.contest, uncertainty), standing
+            ),
+            after=("standing", "uncertainty"),
+        ),
+        wanted=_checks_by_pressure,
+        parallel=True,
+        says=lambda found: core.words_on_solved(found),
+    )
+    def let_in(
+        self,
+        path: str,
+        pressures_kPa: tuple[float, ...],
+        states: Members,
+        waveguides: Any,
+        candidates_paths: Any,
+        stations: int,
+    ) -> core.Solved:
+        """A candidate that the mesh uncertainty does not tell from the best, at what it lacks."""
+        number = [one.name for one in candidates_paths].index(path)
+        return core.solved(waveguides, number, pressures_kPa, states, stations)
+
+    @intermediate()
+    def last_standing(
+        self,
+        compared: core.Comparison,
+        contest: Any,
+        standing: core.Standing,
+        path_check: core.PathCheck,
+        uncertainty: core.Uncertainty,
+        let_in: Members | None = None,
+    ) -> core.Standing:
+        """Where the candidates stand in the end."""
+        if not path_check.independent or let_in is None:
+            return standing
+        found: core.Standing = grown(
+            core.solving(compared, core.widened(contest, uncertainty), standing), let_in
+        )
+        return found
+
+    @intermediate()
+    def ranking(
+        self,
+        motion: fem.Trajectory,
+        compared: core.Comparison,
+        mechanics: core.Mechanics,
+        stations: int,
+        first_ranking: core.Ranking,
+        uncertainty: core.Uncertainty,
+        last_standing: core.Standing | None = None,
+        path_check: core.PathCheck | None = None,
+    ) -> core.Ranking:
+        """The ranking with its mesh uncertainty."""
+        found = first_ranking
+        if last_standing is not None:
+            found = core.ranked(motion, compared, mechanics, stations, last_standing, path_check, None)
+        return attrs.evolve(found, uncertainty_mm=uncertainty.value_mm)
+
+    @intermediate()
+    def chosen(self, ranking: core.Ranking) -> str:
+        """Name of the path of least deviation."""
+        return ranking.chosen
+
+    # What is shown of the paths.
+
+    @stage(
+        "motion of the paths",
+        taking("motion of the paths"),
+        over=Over(("path",), lambda study: [one.name for one in study.candidates_paths]),
+        wanted=_by_pressure,
+        kept=False,
+    )
+    def path_motions(
+        self,
+        path: str,
+        painter: core.PathMotions,
+        path_check: core.PathCheck,
+        last_standing: core.Standing,
+        candidates: Members,
+        let_in: Members | None = None,
+    ) -> core.PathMotion:
+        """Displacement, stress and stretch of the unit with a sensor, against Model A's."""
+        if not path_check.independent or path in last_standing.at_least_mm:
+            raise Dropped
+        return painter.of(core.differences(path, {**candidates, **(let_in or {})}, last_standing))
+
+    @intermediate()
+    def painter(self, meshed: meshing.Mesh, mechanics: core.Mechanics, states: Members) -> core.PathMotions:
+        """What gives fields of a mesh's states, for display."""
+        return core.PathMotions(mechanics, meshed, meshed, states)
+
+    @stage(
+        "map",
+        taking("map"),
+        wanted=lambda study: _by_pressure(study) and not study.effects.clogged,
+        parallel=True,
+    )
+    def sensitivity(
+        self, motion: fem.Trajectory, mechanics: core.Mechanics, stations: int
+    ) -> core.Sensitivity:
+        """How much stiffness anywhere in the unit disturbs its motion."""
+        return core.sensitivity_map(mechanics, motion, stations)
+
+    @stage(
+        "light",
+        taking("light"),
+        wanted=_by_pressure,
+        failing="The light signal is not available",
+        kept=False,
+    )
+    def light(
+        self,
+        unit: design.Unit,
+        optics: Optics,
+        motion: fem.Trajectory,
+        ranking: core.Ranking,
+        mechanics: core.Mechanics,
+        tell: Tell,
+    ) -> core.Light:
+        """The light signal along every path."""
+        return core.lit(unit, optics, motion, ranking, mechanics, tell)
+
+    # Every path of the lattice.
+
+    @stage("ranking of the lattice's paths", taking("ranking of the lattice's paths"), wanted=_searches)
+    def predicted(
+        self,
+        motion: fem.Trajectory,
+        mechanics: core.Mechanics,
+        limits: placement.Limits,
+        stations: int,
+        sensor: Any,
+    ) -> core.Predicted:
+        """Every path's deviation by a reduced response."""
+        return core.predicted(mechanics, motion, limits, stations)
+
+    @intermediate()
+    def whole_motion(self, motion: fem.Trajectory) -> fem.Trajectory:
+        """Model A's motion of the whole body: a path off the mirror plane needs both sides."""
+        return core.whole_motion(motion)
+
+    @stage(
+        "check of the best paths",
+        taking("check of the best paths"),
+        over=Over(
+            ("number",),
+            lambda study: [],
+            grows=lambda study, predicted: core.checked_paths(predicted, study.checks),
+            most=lambda study: 12,
+            after=("predicted",),
+        ),
+        wanted=_searches,
+        parallel=True,
+    )
+    def lattice_paths(
+        self,
+        number: int,
+        whole_motion: fem.Trajectory,
+        mechanics: core.Mechanics,
+        limits: placement.Limits,
+        compared: core.Comparison,
+        stations: int,
+        sensor: Any,
+    ) -> core.CheckedPath:
+        """A path of the lattice by the full model."""
+        return core.check_path(number, whole_motion, mechanics, limits, compared, stations)
+
+    @intermediate()
+    def search(
+        self,
+        unit: design.Unit,
+        limits: placement.Limits,
+        predicted: core.Predicted,
+        checks: int,
+        lattice_paths: Members,
+    ) -> core.SearchOutcome:
+        """The search's outcome, and every path, the best first."""
+        return core.search_of(unit, limits, predicted, checks, lattice_paths)
+
+    @stage("motion of the best path", taking("motion of the best path"), wanted=_searches, kept=False)
+    def best_path_motion(
+        self,
+        search: core.SearchOutcome,
+        meshed: meshing.Mesh,
+        whole_motion: fem.Trajectory,
+        mechanics: core.Mechanics,
+        lattice_paths: Members,
+    ) -> core.NamedMotion:
+        """Displacement, stress and stretch of the unit with the lattice's best path."""
+        return core.motion_of_best(search, meshed, whole_motion, mechanics, lattice_paths)
+
+    # The printable unit.
+
+    @stage("solid with the best path", taking("solid with the best path"), wanted=_places, kept=False)
+    def solid_best(
+        self, unit: design.Unit, quality: str, body: design.Body | None, chosen: str
+    ) -> design.Solid:
+        """The printable unit with the chosen path's waveguide."""
+        return design.build_solid(unit, design.window(unit, chosen), quality, body)
+
+    # What it shows.
+
+    def title(self) -> str:
+        """The report's title."""
+        return f"Sensor path for {self.unit.name}" if "place" in self.stages else super().title()
+
+    @property
+    def left_out(self) -> str:
+        """What the figures of a quick ranking leave out, as text; empty for another study."""
+        return core.left_out(self.tables)
+
+    @section(order=-2)
+    def answer(
+        self,
+        solid: design.Solid,
+        first_ranking: core.Ranking | None = None,
+        ranking: core.Ranking | None = None,
+        motion: fem.Trajectory | None = None,
+    ) -> Iterator[Part]:
+        """The path to take, how certain it is, and the unit with it."""
+        yield from core.answer_parts(self, solid, ranking or first_ranking, motion)
+
+    @section("ranking", "Ranking of the paths", order=-1)
+    def ranks(
+        self,
+        motion: fem.Trajectory,
+        first_ranking: core.Ranking,
+        ranking: core.Ranking | None = None,
+        uncertainty: core.Uncertainty | None = None,
+        standing: core.Standing | None = None,
+        path_check: core.PathCheck | None = None,
+    ) -> Iterator[Part]:
+        """Every path's deviation."""
+        yield from core.ranking_parts(self, ranking or first_ranking, motion)
+        if standing is not None:
+            yield recorded("sweep", core.sweep_figures(standing, path_check))
+            yield from core.contest_doubts(standing, path_check)
+        if uncertainty is not None:
+            yield from core.uncertainty_doubts(uncertainty)
+
+    @section("ranking", "Ranking of the paths", order=-1)
+    def estimated(self, estimates: Members, first_ranking: core.Ranking | None = None) -> Iterator[Part]:
+        """Estimates of the deviations, told at once, and shown as long as no path is solved."""
+        for found in estimates.values():
+            yield recorded(core.ESTIMATED, found)
+            words = core.words_on_estimates(found)
+            yield Sentence(words, terminal=first_ranking is None, page=False, found=True)
+            if first_ranking is None:
+                yield from core.estimate_parts(self, found)
+
+    @section("search", "Search of the whole lattice", order=-1)
+    def searched(
+        self, search: core.SearchOutcome, predicted: core.Predicted, solid: design.Solid
+    ) -> Iterator[Part]:
+        """The best paths of the lattice."""
+        yield from core.search_parts(self, solid, search, predicted)
+
+    @section("light", "Light signal of the sensor", order=-1)
+    def lit(self, light: core.Light, ranking: core.Ranking) -> Iterator[Part]:
+        """The light along every path."""
+        yield from core.light_parts(light, ranking)
+
+    @section()
+    def mapped(self, sensitivity: core.Sensitivity, meshed: meshing.Mesh) -> Iterator[Part]:
+        """Files of the sensitivity map."""
+        yield from core.sensitivity_parts(sensitivity, meshed)
+
+    @section()
+    def shown_motions(
+        self, path_motions: Members, best_path_motion: core.NamedMotion | None = None
+    ) -> Iterator[Part]:
+        """Files of the paths' motion, for display."""
+        yield from core.path_motion_parts(path_motions, best_path_motion)
+
+    @section()
+    def quickly(self) -> Iterator[Part]:
+        """What the figures of a quick ranking leave out."""
+        if self.left_out:
+            yield recorded("left_out", self.left_out)
+
+    @section()
+    def without(self, first_ranking: core.Ranking) -> Iterator[Part]:
+        """What a ranking does without."""
+        if self.in_time:
+            where = "With obstacles" if self.obstacles else "With a wall whose state depends on its history"
+            yield Warn(
+                f"{where} neither the sensitivity map nor the light signal is computed: both need a unit "
+                "whose state depends on pressure only."
+            )
+        elif self.effects.clogged:
+            yield Warn("The sensitivity map is not computed for a unit with a clogged neck.")
+
+    @section("where", "Deviation of each path over length and time", order=1)
+    def maps(self, first_ranking: core.Ranking, ranking: core.Ranking | None = None) -> Iterator[Part]:
+        """A map for each path."""
+        yield from core.heatmap_parts(ranking or first_ranking)
+
+    @section("marginals", "Mean deviation along the unit and over time", order=1)
+    def marginals(self, first_ranking: core.Ranking, ranking: core.Ranking | None = None) -> Iterator[Part]:
+        """Means over time and over length."""
+        yield from core.marginal_parts(self, ranking or first_ranking)
