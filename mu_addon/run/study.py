@@ -34,8 +34,9 @@ import attrs
 
 from ..errors import InputError
 from ..reading import parse_toml
+from ..toml_reader import TomlTable
 from .folder import RUN, FolderLayout
-from .inputs import FORMAT, read_inputs, structured
+from .inputs import FORMAT, read_inputs
 
 if TYPE_CHECKING:
     from .progress import Progress
@@ -136,16 +137,28 @@ class ReadInput(Input):
 class Found:
     """Inputs as they are found: their file, its keys, those of its table [run], the inputs read so far.
 
-    before: hashes of what was read from other files (`ReadInput`). replaced: names of inputs whose values
-    options of a command replace.
+    text: of the file. before: hashes of what was read from other files (`ReadInput`). replaced: names of
+    inputs whose values options of a command replace.
     """
 
     path: Path
     keys: dict[str, Any]
     run: dict[str, Any]
+    text: str = ""
     given: dict[str, Any] = attrs.field(factory=dict)
     before: dict[str, Any] = attrs.field(factory=dict)
     replaced: tuple[str, ...] = ()
+
+    @property
+    def table(self) -> TomlTable:
+        """Its keys, with their places."""
+        return TomlTable(self.keys, str(self.path), self.text)
+
+    def take(self, key: str, hint: Any, default: Any = attrs.NOTHING) -> Any:
+        """The value of a key as a type, taken out of the keys; raises InputError."""
+        found = self.table.take(key, hint, default)
+        self.keys.pop(key, None)
+        return found
 
 
 def setting(description: Any, *, metavar: str | None = None, decides: bool = True) -> Any:
@@ -509,10 +522,11 @@ class Study:
         """
         from ..toml_writer import toml_text
 
-        keys, run = read_inputs(path, *words)
+        document, run = read_inputs(path, *words)
+        keys = dict(document.values)
         for name, value in replaced.items():
             keys |= parse_toml(toml_text(cls.inputs()[name].write(name, value).keys, ""), name)
-        found = Found(path, keys, run, replaced=tuple(replaced))
+        found = Found(path, keys, run, document.text, replaced=tuple(replaced))
         special = {}
         for name, one in cls.inputs().items():
             if one.kind != "setting":
@@ -521,7 +535,7 @@ class Study:
             if not one.decides and name in run:
                 keys[name] = run[name]
             found.given[name] = keys.get(name, one.descriptions[0].default)
-        study = structured(cls, keys, str(path), **special).complete()
+        study = found.table.made(cls, **special).complete()
         for name in found.before:
             study._read()[name].require(name, getattr(study, name), found)
         return study

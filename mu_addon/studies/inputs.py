@@ -14,8 +14,8 @@ from .. import design, evidence, materials, measured
 from ..design.quantity import described, in_kPa, in_MPa
 from ..design.settings import USUAL_RESIN
 from ..errors import InputError
-from ..reading import file_text, unreadable
-from ..run.inputs import named_path, structured
+from ..reading import text_in
+from ..run.inputs import named_path
 from ..run.study import Found, Input, Written, given
 
 UNIT, MODEL = "unit.toml", "model.toml"
@@ -73,12 +73,7 @@ class WordsInput(Input):
 
     def read(self, name: str, found: Found) -> tuple[str, ...]:
         """The words of the file; raises InputError."""
-        words = found.keys.pop(name, [])
-        if not isinstance(words, list) or not all(isinstance(word, str) for word in words):
-            raise InputError(
-                f"{words!r} does not fit", f"{found.path}, {name}", "give a list of texts in quotes"
-            )
-        return tuple(words)
+        return found.take(name, tuple[str, ...], ())
 
 
 @attrs.frozen
@@ -175,10 +170,11 @@ class ResinInput(Input):
 
     def read(self, name: str, found: Found) -> Resin:
         """The resin of its table; raises InputError."""
-        table = found.keys.pop(name, None)
-        if isinstance(table, dict) and isinstance(table.get("modulus_kPa"), int | float):
-            table["modulus_MPa"] = in_MPa(table.pop("modulus_kPa"))
-        return structured(Resin, table, f"{found.path}, [{name}]")
+        table = found.table.inner(name)
+        found.keys.pop(name, None)
+        modulus = in_MPa(table.take("modulus_kPa", float))
+        values = {key: value for key, value in table.values.items() if key != "modulus_kPa"}
+        return attrs.evolve(table, values=values).made(Resin, modulus_MPa=modulus)
 
 
 @attrs.frozen
@@ -265,9 +261,9 @@ class PathInput(Input):
 
     def read(self, name: str, found: Found) -> design.Window | NodePath | None:
         """The path of the file; raises InputError."""
-        of = {"name": found.keys.pop(name, ""), "points": found.keys.pop("points_mm", [])}
-        known = structured(NodePath, of, str(found.path))
-        return known if known.points else self.made((known.name,), found.given)
+        path = found.take(name, str, "")
+        points = found.take("points_mm", tuple[tuple[float, float, float], ...], ())
+        return NodePath(path, points) if points else self.made((path,), found.given)
 
 
 def path_of(unit: design.Unit, name: str, row: str = "") -> design.Window | NodePath | None:
@@ -280,12 +276,8 @@ def path_of(unit: design.Unit, name: str, row: str = "") -> design.Window | Node
         )
     if not name.endswith(".csv"):
         return design.window(unit, name) if name else None
-    try:
-        rows = csv.DictReader(io.StringIO(file_text(name)))
-    except (OSError, UnicodeDecodeError) as error:
-        raise InputError(
-            f"cannot read the paths: {unreadable(error)}", name, "give paths.csv of `place --paths graph`"
-        ) from error
+    text = text_in(name, "paths", "give paths.csv of `place --paths graph`")
+    rows = csv.DictReader(io.StringIO(text))
     named = next((r for r in rows if not row or r.get("path") == row), None)
     if named is None:
         raise InputError(
@@ -356,7 +348,7 @@ class TableInput(Input):
 
     def read(self, name: str, found: Found) -> Any:
         """The values of the table, the others by default; raises InputError."""
-        return structured(self.of(), found.keys.pop(name, {}), f"{found.path}, [{name}]")
+        return found.take(name, self.of(), None) or self.of()()
 
 
 @attrs.frozen
@@ -382,10 +374,7 @@ class NumbersInput(Input):
 
     def read(self, name: str, found: Found) -> tuple[float, ...]:
         """The numbers of the file; raises InputError."""
-        numbers = found.keys.pop(name, [])
-        if not isinstance(numbers, list) or not all(type(n) in (int, float) for n in numbers):
-            raise InputError(f"{numbers!r} does not fit", f"{found.path}, {name}", "give a list of numbers")
-        return tuple(map(float, numbers))
+        return found.take(name, tuple[float, ...], ())
 
 
 @attrs.frozen

@@ -76,10 +76,10 @@ def test_the_path_of_a_target_may_be_a_freedom():
     assert [t.quantity.path for t in chosen.targets[1:]] == ["alpha4", "alpha1"]
     assert found.unit_of(values).waveguide.row == 1
     assert read(found).start == found.start
-    for wrong, words in (('"alpha99"', "is not a path"), ("3", "no list of names")):
+    for wrong, words in (('"alpha99"', "is not a path"), ("3", "is not text in quotes")):
         with pytest.raises(InputError, match=words) as error:
             design(HEAD + ANGLE + WALL + path.replace('"alpha4"', wrong))
-        assert "line 13, values" in error.value.where
+        assert "line 13, [freedom] values" in error.value.where
     with pytest.raises(InputError, match="is not a path of the unit"):
         design(HEAD + ANGLE + slope + WALL)
 
@@ -170,7 +170,7 @@ def test_what_a_printed_body_does_not_have_is_no_freedom(name, instead, free):
     table = f'[[freedom]]\nparameter = "material.{name}"\n{free}\n'
     with pytest.raises(InputError, match=f"material.{name} moves nothing") as error:
         design(HEAD + ANGLE + WALL + table)
-    assert "line 12, parameter" in error.value.where
+    assert "line 12, [freedom] parameter" in error.value.where
     assert f"material.{instead}" in error.value.remedy
 
 
@@ -260,7 +260,7 @@ def test_what_follows_a_freedom_changes_with_it():
         (HEAD + "refin = 0.5\n" + ANGLE + WALL, "did you mean 'refine'", "line 3"),
         (HEAD + 'fidelity = "homogenised"\n' + ANGLE + WALL, "unknown key 'fidelity'", "line 3, fidelity"),
         (HEAD + ANGLE + KIND, "not a value of", "line 9"),
-        (HEAD + '[[target]]\nkind = "stiffness"\nlow = 1\n' + WALL, "not an axis", "direction"),
+        (HEAD + '[[target]]\nkind = "stiffness"\nlow = 1\n' + WALL, "direction is missing", "direction"),
         (HEAD + SENSOR + WALL, "path", "path"),
         (ANGLE + WALL, "format", "format"),
         ("format = 1\n" + ANGLE + WALL, "no unit is given", "design.toml"),
@@ -273,7 +273,7 @@ def test_what_follows_a_freedom_changes_with_it():
         (HEAD + ANGLE + CELL, "does not give column, row and chamber", "line 9"),
         (HEAD + ANGLE + CELL.replace('"0 2"', '"0 2 *"').replace("1.3", "3"), "not a range of", "line 10"),
         (HEAD + ANGLE + CELL.replace('"0 2"', '"0 9 *"'), "0 9 *", "line 9"),
-        (HEAD + "robust = 1\n" + ANGLE + WALL, "neither true nor false", "line 3"),
+        (HEAD + "robust = 1\n" + ANGLE + WALL, "not true or false", "line 3"),
         (HEAD + "orientation_deg = 400\n" + ANGLE + WALL, "out of bounds", "line 3"),
     ],
 )  # fmt: skip

@@ -76,7 +76,7 @@ READERS: dict[str, tuple[Callable[[Path], Any], str | None]] = {
     "phases": (read_phases, None),
     "chain": (
         Chain.read_file,
-        "[target]\nreach = [0.0, 5.0, 40.0]\n"
+        "format = 1\n[target]\nreach = [0.0, 5.0, 40.0]\n"
         + 2 * '[[unit]]\npreset = "mu-1.0x"\npressure_kPa = [-5.0, 10.0]\n',
     ),
     "chain's protocol": (

@@ -87,7 +87,7 @@ def _place(clip: Any, name: str, at: tuple[float, float], markers: MarkerSetting
     x, y = markers.search_px / 2 / width, markers.search_px / 2 / height
     marker.search_min, marker.search_max = (-x, -y), (x, y)
     track.select = True
-    prepare([track], markers.kind)
+    prepare([track], markers.marks)
 
 
 @contextmanager

@@ -16,6 +16,7 @@ from ...graph.evaluation import Finished, Order
 from ...reading import file_text
 from ...studies.sweep import LAST, TABLE, Sweep
 from ...studies.use_case import use_case
+from ...toml_reader import TomlTable
 from ..parameter_study.plan import Plan
 from ..parameter_study.variable import Inputs, changed_inputs, variable
 from ..simulate_and_place.job import job_with, protocol_of
@@ -75,7 +76,7 @@ def _plan_of(call: Call) -> Plan:
             "ranges",
             "leave one of them out, or vary another parameter",
         )
-    variables = tuple(variable(name, dict(table), call.node) for name, table in ranges)
+    variables = tuple(variable(name, TomlTable(table, call.node)) for name, table in ranges)
     # A setting that is wrong for every point is reported before any work.
     job_with(tables, call.node, unit=design.unit, protocol=protocol, workers=1)
     return Plan(

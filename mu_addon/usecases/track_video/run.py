@@ -14,7 +14,6 @@ from typing import Any
 import attrs
 import numpy as np
 
-from ...design.toml_text import line_of, parse, place
 from ...errors import InputError
 from ...files import write_text
 from ...measured.kinds import COMMON, KINDS
@@ -22,31 +21,16 @@ from ...measured.pose import AT_REST, SAMPLES
 from ...measured.table import Remark, read_table
 from ...measured.video import Motion, Pair, Tracks, View, motion, resting
 from ...measured.writing import add_experiment, csv_text, file_stem, tried
-from ...reading import file_text, is_finite, unreadable
+from ...reading import text_in
 from ...run.context import RunContext
 from ...table_cells.own_tables import own_text
+from ...toml_reader import TomlTable, read_toml
 from ...toml_writer import toml_text
 from .tracked_table import PROJECTS, SUFFIXES, read_pixels
 
 Array = np.ndarray[Any, Any]
 
 KIND = "unit_pressure"
-HEAD = (
-    "camera",
-    "base",
-    "tip",
-    "ruler",
-    "ruler_mm",
-    "mm_per_pixel",
-    "follow_base",
-    "fps",
-    "starts_s",
-    "marks",
-    "pattern_px",
-    "search_px",
-    "marker",
-)
-OF_MARKER = ("name", "pixel", "place_mm")
 OF_EXPERIMENT = tuple(k for k in COMMON + KINDS[KIND].may_have_keys if k not in ("kind", "file"))
 MARKER_KINDS = ("crosses", "dots")
 """Kinds of markers: `crosses` show their rotation, `dots` do not."""
@@ -56,14 +40,25 @@ MARKER_KINDS = ("crosses", "dots")
 class MarkerSettings:
     """Settings of the markers for a tracker.
 
-    pixels: position of each by name in the first frame, right and down from the upper left corner; kind: one
-    of `MARKER_KINDS`; pattern_px: side of the compared square; search_px: side of the searched square.
+    pixels: position of each by name in the first frame, right and down from the upper left corner; marks:
+    one of `MARKER_KINDS`; pattern_px: side of the compared square; search_px: side of the searched square.
     """
 
     pixels: Mapping[str, tuple[float, float]]
-    kind: str = "crosses"
+    marks: str = "crosses"
     pattern_px: float = 25.0
     search_px: float = 81.0
+
+    def __attrs_post_init__(self) -> None:
+        if self.marks not in MARKER_KINDS:
+            what = f"marks = {self.marks!r} is not known"
+            raise InputError(what, "marks", f"say {' or '.join(MARKER_KINDS)}")
+        if not 5 <= self.pattern_px < self.search_px <= 2000:
+            raise InputError(
+                f"pattern_px = {self.pattern_px:g} and search_px = {self.search_px:g} do not fit",
+                "pattern_px",
+                "a pattern of 5 pixels or more, and a larger square to search",
+            )
 
 
 @attrs.frozen
@@ -94,134 +89,61 @@ class Filmed:
     remarks: tuple[Remark, ...]
 
 
+@attrs.frozen
+class _Marker:
+    """A table [[marker]]: its name, its pixel in the first frame, y and z in the unit's frame."""
+
+    name: str
+    pixel: tuple[float, float] | None = None
+    place_mm: tuple[float, float] | None = None
+
+
+_GIVEN = {
+    View: ("places_mm",),
+    MarkerSettings: ("pixels",),
+    Bench: ("view", "markers", "experiment"),
+}
+"""Fields that other tables of the file give."""
+_KEYS = [f.alias for kind, given in _GIVEN.items() for f in attrs.fields(kind) if f.alias not in given]
+
+
 def read_bench(path: Path) -> Bench:
     """Read a TOML file that describes a video; raises InputError with line and remedy."""
-    try:
-        text = file_text(path)
-    except (OSError, UnicodeDecodeError) as error:
-        raise InputError(
-            f"cannot read the description of the video: {unreadable(error)}", str(path), "check path and file"
-        ) from error
-    document = parse(text, {"": HEAD, "experiment": OF_EXPERIMENT}, str(path))
-
-    def at(key: str) -> str:
-        return place(str(path), line_of(text, key))
-
-    pixels, places = _markers(document.get("marker"), str(path))
-    base = _pair(document, "base", at)
-    if base is None:
-        raise InputError("the base is not named", str(path), 'name its two markers, base = ["low", "high"]')
-    missing = [name for name in base if name not in places]
-    if missing:
-        raise InputError(
-            f"marker {missing[0]!r} of the base has no place_mm",
-            str(path),
-            "give its y and z in the unit's frame, in mm",
-        )
-    markers = MarkerSettings(
-        pixels, **_given(document, at, kind="marks", pattern_px="pattern_px", search_px="search_px")
-    )
-    if markers.kind not in MARKER_KINDS:
-        raise InputError(
-            f"marks = {markers.kind!r} is not known", at("marks"), f"say {' or '.join(MARKER_KINDS)}"
-        )
-    if not 5 <= markers.pattern_px < markers.search_px <= 2000:
-        raise InputError(
-            f"pattern_px = {markers.pattern_px:g} and search_px = {markers.search_px:g} do not fit",
-            at("pattern_px"),
-            "a pattern of 5 pixels or more, and a larger square to search",
-        )
-    view = View(
-        base,
-        (places[base[0]], places[base[1]]),
-        _pair(document, "tip", at),
-        ruler=_pair(document, "ruler", at),
-        **_given(
-            document,
-            at,
-            camera="camera",
-            ruler_mm="ruler_mm",
-            mm_per_pixel="mm_per_pixel",
-            follow_base="follow_base",
-        ),
-    )
-    return Bench(
-        view,
-        markers,
-        experiment=document.get("experiment", {}),
-        **_given(document, at, fps="fps", starts_s="starts_s"),
-    )
+    table = read_toml(path, "description of the video", "check path and file")
+    table.only((*_KEYS, "marker", "experiment"))
+    markers: dict[str, _Marker] = {}
+    for given in table.tables("marker"):
+        one = given.made(_Marker)
+        if one.name in markers:
+            what = f"two markers are named {one.name!r}"
+            raise InputError(what, given.at("name"), "give each [[marker]] a different name")
+        markers[one.name] = one
+    if not markers:
+        raise InputError("no marker is defined", str(path), "define each marker under [[marker]]")
+    base = table.take("base", Pair)
+    places = [markers[name].place_mm if name in markers else None for name in base]
+    for name, place in zip(base, places, strict=True):
+        if place is None:
+            remedy = "give its y and z in the unit's frame, in mm"
+            raise InputError(f"marker {name!r} of the base has no place_mm", table.at("base"), remedy)
+    for key in ("ruler_mm", "mm_per_pixel", "fps", "starts_s"):
+        table.number(key, default=None)
+    view = _part(table, View, base=base, places_mm=tuple(places))
+    pixels = {name: one.pixel for name, one in markers.items() if one.pixel is not None}
+    own = table.inner("experiment").only(OF_EXPERIMENT).values
+    return _part(table, Bench, view=view, markers=_part(table, MarkerSettings, pixels=pixels), experiment=own)
 
 
-_TYPES = {"camera": str, "marks": str, "follow_base": bool}
-
-
-def _given(document: Mapping[str, Any], at: Callable[[str], str], **keys: str) -> dict[str, Any]:
-    """Values of the keys that are present, of their type, by the names they are wanted under."""
-    found = {}
-    for name, key in keys.items():
-        if key not in document:
-            continue
-        value, wanted = document[key], _TYPES.get(key, float)
-        if wanted is float and isinstance(value, int) and not isinstance(value, bool):
-            value = float(value)
-        if not isinstance(value, wanted) or (isinstance(value, float) and not math.isfinite(value)):
-            kinds = {str: "a text", bool: "true or false", float: "a number"}
-            raise InputError(f"{key} = {value!r} is not {kinds[wanted]}", at(key), "correct that line")
-        found[name] = value
-    return found
-
-
-def _pair(document: Mapping[str, Any], key: str, at: Callable[[str], str]) -> Pair | None:
-    value = document.get(key)
-    if value is None:
-        return None
-    if not (isinstance(value, list) and len(value) == 2 and all(isinstance(v, str) for v in value)):
-        raise InputError(f"{key} = {value!r} is not a pair of names", at(key), 'write it as ["one", "other"]')
-    return value[0], value[1]
-
-
-def _markers(
-    tables: Any, origin: str
-) -> tuple[dict[str, tuple[float, float]], dict[str, tuple[float, float]]]:
-    """Pixels and positions of the markers by name."""
-    pixels: dict[str, tuple[float, float]] = {}
-    places: dict[str, tuple[float, float]] = {}
-    names: list[str] = []
-    for table in tables if isinstance(tables, list) else []:
-        name = table.get("name") if isinstance(table, dict) else None
-        if not isinstance(name, str) or not name or name in names:
-            raise InputError(f"a marker is named {name!r}", origin, "give each [[marker]] a different name")
-        names.append(name)
-        for key, value in table.items():
-            if key not in OF_MARKER:
-                raise InputError(
-                    f"marker {name!r} has an unknown key {key!r}", origin, f"known: {', '.join(OF_MARKER)}"
-                )
-            if key == "name":
-                continue
-            if not (isinstance(value, list) and len(value) == 2 and all(is_finite(v) for v in value)):
-                raise InputError(
-                    f"{key} = {value!r} of marker {name!r} is not a pair of numbers",
-                    origin,
-                    "write it as [1.0, 2.0]",
-                )
-            (pixels if key == "pixel" else places)[name] = float(value[0]), float(value[1])
-    if not names:
-        raise InputError("no marker is defined", origin, "define each marker under [[marker]]")
-    return pixels, places
+def _part(table: TomlTable, kind: type[Any], **given: Any) -> Any:
+    """An instance of a class, with the keys of the table that are its fields."""
+    names = [f.alias for f in attrs.fields(kind) if f.alias not in given]
+    values = {key: value for key, value in table.values.items() if key in names}
+    return attrs.evolve(table, values=values).made(kind, **given)
 
 
 def read_pressure(path: Path) -> tuple[Array, Array]:
     """Time in s and pressure in kPa, (k,) each, of a recording or a protocol; raises InputError."""
-    try:
-        text = own_text(path)
-    except (OSError, UnicodeDecodeError) as error:
-        raise InputError(
-            f"cannot read the pressure: {unreadable(error)}",
-            str(path),
-            "give a CSV file of time_s,pressure_kPa",
-        ) from error
+    text = text_in(path, "pressure", "give a CSV file of time_s,pressure_kPa", read=own_text)
     table = read_table(text, KINDS["pressure_hold"], Path(path))
     return table.columns["time_s"], table.columns["pressure_kPa"]
 
