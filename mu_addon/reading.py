@@ -95,7 +95,7 @@ def text_in(
     try:
         return read(path, most)
     except UnicodeDecodeError as error:
-        raise InputError("the file is not UTF-8 text", str(path), "save it as UTF-8") from error
+        raise InputError("the file is not UTF-8 text", str(path), f"save it as UTF-8, or {remedy}") from error
     except OSError as error:
         raise InputError(f"cannot read the {what}: {unreadable(error)}", str(path), remedy) from error
 

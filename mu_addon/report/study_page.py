@@ -18,10 +18,13 @@ _ALWAYS = {"summary.json": "all results of this run as numbers", "log.ndjson": "
 
 def write_page(work: Execution, stopped: str = "") -> None:
     """Draw the pictures and write report.html; stopped: why an incomplete run stopped."""
+    if work.study.joins and not any(parts for _, parts in work.shown):
+        return
     with work.context.progress.stage("report"):
+        work.open()
         versions = package_versions()
         work.context.summary["versions"] = versions
-        write_text(work.folder / "report.html", page_of(work, versions, stopped))
+        write_text(work.folder / work.study.page, page_of(work, versions, stopped))
 
 
 def page_of(work: Execution, versions: Mapping[str, str], stopped: str = "") -> str:

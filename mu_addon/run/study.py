@@ -65,8 +65,10 @@ class Input:
     descriptions: of the plain values that it is, or is made of (`design.quantity.Description`); none where
     faces ask for it in their own way. decides: False for one that decides no figure, such as a number of
     processes: it is in no key, and in the table [run] of the inputs' file. option: its name in a command, if
-    it is not that of the description; metavar: stands for its value there; many: it takes several words, or
-    so many; alone: its value where the option stands without one; path: "file" or "folder" if it names one.
+    it is not that of the description; argument: what stands for it where it is no option but a word in its
+    place; required: no command does without the option; repeated: the option may stand several times, and
+    the value is a list; metavar: stands for its value there; many: it takes several words, or so many;
+    alone: its value where the option stands without one; path: "file" or "folder" if it names one.
     An input of another kind overrides `made`, `write` and `read`.
     """
 
@@ -74,6 +76,9 @@ class Input:
     descriptions: tuple[Any, ...] = ()
     decides: bool = True
     option: str = ""
+    argument: str = ""
+    required: bool = False
+    repeated: bool = False
     metavar: str | tuple[str, ...] | None = None
     many: bool | int = False
     alone: str = ""
@@ -409,7 +414,9 @@ class Study:
     name: of its command; its inputs are in `name`.toml. from_file: of a command that reads such a file, and
     whose options replace values in it: help on the file, and what to do where it cannot be read. files:
     content of each file of the run's folder, by name or pattern; to_fill: files that are filled in by hand,
-    which no run removes. example: a command line. node: None of a study that is no node.
+    which no run removes. example: a command line. node: None of a study that is no node. joins: its folder
+    is one that several studies add to, such as one of measured data: it keeps no inputs and no results there,
+    is not resumed, and begins to use it with its first file. page: name of its report, "" without one.
     """
 
     name: ClassVar[str]
@@ -418,6 +425,8 @@ class Study:
     from_file: ClassVar[tuple[str, str]] = ("", "")
     example: ClassVar[str] = ""
     node: ClassVar[Node | None] = None
+    joins: ClassVar[bool] = False
+    page: ClassVar[str] = "report.html"
 
     @property
     def processes(self) -> int:
@@ -464,7 +473,7 @@ class Study:
     def layout(cls) -> FolderLayout:
         """The files of its folder."""
         optional = tuple(file for name, one in cls.inputs().items() for file in one.file_names(name))
-        results = (*cls.files, "report.html")
+        results = (*cls.files, cls.page)
         return FolderLayout(f"{cls.name}.toml", f"# Inputs of `{cls.name}`.", results, optional, cls.to_fill)
 
     # What its inputs decide, before a run.
@@ -495,9 +504,11 @@ class Study:
     # Inputs as files.
 
     def texts(self) -> dict[str, str]:
-        """Text of every file of inputs, by name."""
+        """Text of every file of inputs, by name; none of a study that joins a folder."""
         from ..toml_writer import toml_text
 
+        if self.joins:
+            return {}
         layout = self.layout()
         run: dict[str, Any] = {}
         values: dict[str, Any] = {"format": FORMAT}

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from functools import cache
 from importlib import import_module
+from keyword import iskeyword
 
 from ..run.study import Study
 
@@ -16,10 +17,12 @@ STUDIES = {
     "fit-material": "FitMaterial",
     "grip": "Grip",
     "homogenize": "Homogenize",
+    "import": "Import",
     "measure": "Measure",
     "optimize": "Optimize",
     "specimens": "Specimens",
     "sweep": "Sweep",
+    "track": "Track",
 }
 """Class by name: of its command, its node and its module."""
 
@@ -27,5 +30,6 @@ STUDIES = {
 @cache
 def study(name: str) -> type[Study]:
     """The study of a command."""
-    found: type[Study] = getattr(import_module(f".{name.replace('-', '_')}", __name__), STUDIES[name])
+    module = import_module(f".{name.replace('-', '_')}{'_' * iskeyword(name)}", __name__)
+    found: type[Study] = getattr(module, STUDIES[name])
     return found

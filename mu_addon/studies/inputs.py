@@ -23,11 +23,9 @@ UNIT, MODEL = "unit.toml", "model.toml"
 _LONGEST_PATH = 1 << 18
 
 
-def asked(
-    kind: type[Input], name: str, text: str, default: str = "", *, empty: Any = None, **more: Any
-) -> Any:
+def asked(of: type[Input], name: str, text: str, default: str = "", *, empty: Any = None, **more: Any) -> Any:
     """attrs field of an input that is made of one text; empty: its value without it; more: of the input."""
-    return given(kind(descriptions=(described(name, default, text),), **more), default=empty)
+    return given(of(descriptions=(described(name, default, text),), **more), default=empty)
 
 
 @attrs.frozen
@@ -80,14 +78,21 @@ class WordsInput(Input):
 class MeasuredInput(Input):
     """A folder of measured data, read at its place.
 
-    data: what of it decides, by the experiments' names; text: says in a command what folder it is.
+    data: what of it decides, by the experiments' names.
     """
 
     kind: str = "measured"
+    descriptions: tuple[Any, ...] = (
+        described("folder", "", "folder of measured data: experiments.toml and its CSV files"),
+    )
+    argument: str = "FOLDER"
     data: Callable[[measured.Measured], dict[str, Any]] = lambda found: {
         e.name: e.hash() for e in found.experiments
     }
-    text: str = ""
+
+    def made(self, values: tuple[Any, ...], given: Mapping[str, Any]) -> measured.Measured:
+        """The folder's content; raises InputError."""
+        return measured.read_folder(Path(values[0]))
 
     def write(self, name: str, value: measured.Measured) -> Written:
         """Its place, and what decides."""
@@ -115,7 +120,9 @@ class PlaceInput(Input):
     needed: bool = True
 
     def made(self, values: tuple[Any, ...], given: Mapping[str, Any]) -> Any:
-        """The path of a text; None without."""
+        """The path of a text, or those of several; None without."""
+        if self.many:
+            return tuple(map(Path, values[0]))
         return Path(values[0]) if values[0] else None
 
     def write(self, name: str, value: Any) -> Written:
@@ -382,6 +389,19 @@ class ModelInput(Input):
     """An extended model of a diagnosis, in a file of its own, or None."""
 
     kind: str = "model"
+    descriptions: tuple[Any, ...] = (
+        described(
+            "model",
+            "",
+            "extended model, the model.toml of `diagnose`: its identified effects are applied to the unit; "
+            "empty: none",
+        ),
+    )
+    metavar: str = "FILE"
+
+    def made(self, values: tuple[Any, ...], given: Mapping[str, Any]) -> evidence.ExtendedModel | None:
+        """The model of a file; raises InputError."""
+        return evidence.load_model(Path(values[0])) if values[0] else None
 
     def write(self, name: str, value: evidence.ExtendedModel | None) -> Written:
         """The file's name, and its text."""

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from functools import cache
+from functools import cache, partial
 from pathlib import Path
 
 from ..run.context import RunContext
@@ -23,9 +23,15 @@ def use_case(name: str) -> UseCase[Study]:
         kind.read,
         run,
         console_summary=lambda summary: [],
-        plan=lambda study: [*study.expected().items(), ("report", REPORT_S)],
+        plan=lambda study: [*study.expected().items(), *_report(study)],
         plan_in=plan,
+        begin=_join if kind.joins else None,
     )
+
+
+def _join(job: Study, folder: Path, context: RunContext) -> None:
+    """Leave the folder as it is until the first file, and every run of its own."""
+    context.words = None
 
 
 def run(job: Study, folder: Path, context: RunContext) -> Execution:
@@ -33,7 +39,10 @@ def run(job: Study, folder: Path, context: RunContext) -> Execution:
     from ..report.study_page import write_page
 
     work: Execution = context.work or Execution(job, folder, context)
-    context.report = lambda stopped: write_page(work, stopped)
+    if job.joins:
+        work.opening = partial(context.open_folder, folder)
+    if job.page:
+        context.report = lambda stopped: write_page(work, stopped)
     context.console_summary = lambda summary: work.lines
     work.run()
     if work.fault is not None:
@@ -47,4 +56,8 @@ def run(job: Study, folder: Path, context: RunContext) -> Execution:
 def plan(job: Study, folder: Path, context: RunContext) -> Plan:
     """Stages with the seconds that are left of each."""
     context.work = Execution(job, folder, context)
-    return [*context.work.plan(), ("report", REPORT_S)]
+    return [*context.work.plan(), *_report(job)]
+
+
+def _report(job: Study) -> Plan:
+    return [("report", REPORT_S)] if job.page else []

@@ -14,7 +14,7 @@ import attrs
 from ..errors import InputError
 from ..run.context import RunContext
 from ..run.usecase import UseCase
-from ..studies import STUDIES
+from ..studies import STUDIES, study
 from ..studies.use_case import use_case
 
 # Modules with `USE_CASE` by the first file of inputs, imported on demand.
@@ -37,7 +37,7 @@ def use_case_of(folder: Path) -> UseCase[Any]:
     if cases:
         # A file whose first line is another's is read all the same: its reader reports the fault best.
         return next((case for case in cases if case.layout.is_of(folder)), cases[0])
-    names = (*MODULES, *(f"{name}.toml" for name in STUDIES))
+    names = (*MODULES, *(f"{name}.toml" for name in STUDIES if not study(name).joins))
     raise InputError(
         "this folder contains no study and no other run",
         str(folder),

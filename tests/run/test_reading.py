@@ -30,8 +30,10 @@ from mu_addon.fem.protocol import read_protocol
 from mu_addon.files import read_npz
 from mu_addon.grasp import read_phases
 from mu_addon.homogenize.effective_file import read_effective
+from mu_addon.lab_files.tracked_table import read_pixels
 from mu_addon.materials.library import read_material
 from mu_addon.measured import table
+from mu_addon.measured.bench import read_bench, read_pressure
 from mu_addon.measured.folder import read_folder
 from mu_addon.measured.kinds import KINDS
 from mu_addon.measured.table import read_table
@@ -42,8 +44,6 @@ from mu_addon.sensing.recording import read_recording
 from mu_addon.studies.chain import Chain
 from mu_addon.studies.inputs import path_of
 from mu_addon.usecases.parameter_study.plan import read_plan
-from mu_addon.usecases.track_video.run import read_bench, read_pressure
-from mu_addon.usecases.track_video.tracked_table import read_pixels
 
 ASSETS = Path(__file__).parents[2] / "assets"
 

@@ -11,8 +11,8 @@ import bpy
 import numpy as np
 
 from ...errors import InputError
+from ...measured.bench import MarkerSettings
 from ...measured.video import Tracks
-from ...usecases.track_video.run import MarkerSettings
 
 # Crosses show their rotation; a dot does not, and a tracker that fits its rotation drifts off.
 MODELS = {"crosses": "LocRot", "dots": "Loc"}

@@ -16,13 +16,13 @@ from typing import Any
 import attrs
 import numpy as np
 
-from ...errors import InputError
-from ...lab_files.columns import column, unit_of
-from ...measured.table import Remark
-from ...measured.video import Tracks
-from ...reading import require_rows, text_in
-from ...table_cells.notation import is_like_number
-from ...table_cells.own_tables import own_lines, own_rows, own_text
+from ..errors import InputError
+from ..measured.table import Remark
+from ..measured.video import Tracks
+from ..reading import require_rows, text_in
+from ..table_cells.notation import is_like_number
+from ..table_cells.own_tables import own_lines, own_rows, own_text
+from .columns import column, unit_of
 
 Array = np.ndarray[Any, Any]
 Line = tuple[int, str]

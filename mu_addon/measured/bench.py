@@ -7,26 +7,23 @@ from __future__ import annotations
 
 import io
 import math
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
 import attrs
 import numpy as np
 
-from ...errors import InputError
-from ...files import write_text
-from ...measured.kinds import COMMON, KINDS
-from ...measured.pose import AT_REST, SAMPLES
-from ...measured.table import Remark, read_table
-from ...measured.video import Motion, Pair, Tracks, View, motion, resting
-from ...measured.writing import add_experiment, csv_text, file_stem, tried
-from ...reading import text_in
-from ...run.context import RunContext
-from ...table_cells.own_tables import own_text
-from ...toml_reader import TomlTable, read_toml
-from ...toml_writer import toml_text
-from .tracked_table import PROJECTS, SUFFIXES, read_pixels
+from ..errors import InputError
+from ..reading import text_in
+from ..table_cells.own_tables import own_text
+from ..toml_reader import TomlTable, read_toml
+from ..toml_writer import toml_text
+from .kinds import COMMON, KINDS
+from .pose import AT_REST, SAMPLES
+from .table import Remark, read_table
+from .video import Motion, Pair, Tracks, View, motion, resting
+from .writing import Entry, csv_text, file_stem
 
 Array = np.ndarray[Any, Any]
 
@@ -73,9 +70,6 @@ class Bench:
     fps: float | None = None
     starts_s: float = 0.0
     experiment: Mapping[str, Any] = attrs.field(factory=dict)
-
-
-Tracker = Callable[[Path, MarkerSettings], Tracks]
 
 
 @attrs.frozen(eq=False)
@@ -211,22 +205,11 @@ def filmed(tracks: Tracks, bench: Bench, pressure: tuple[Array, Array], where: s
     return Filmed(kept, time, p, found, (*remarks, *found.remarks))
 
 
-def write_experiment(found: Filmed, bench: Bench, name: str, folder: Path) -> tuple[Path, tuple[Remark, ...]]:
-    """Put an experiment into a folder of measured data; return its CSV file and the reader's remarks.
-
-    An experiment of that name made from a video before is replaced. Raises InputError where another holds the
-    name, or the data could not be read again; OutputError.
-    """
-    table = f"{file_stem(name)}.csv"
-    block = _block(name, table, bench)
-    remarks = add_experiment(folder, name, block, table, _table(found, bench))
-    write_text(folder / f"{file_stem(name)}.pixels.csv", _pixels(found, bench.starts_s))
-    return folder / table, remarks
-
-
-def _block(name: str, file: str, bench: Bench) -> str:
+def entry_of(found: Filmed, bench: Bench, name: str) -> Entry:
+    """The experiment, with its name, as it is put into a folder of measured data."""
+    file = f"{file_stem(name)}.csv"
     keys = {"name": name, "kind": KIND, "file": file, "role": "fit"} | dict(bench.experiment) | {"name": name}
-    return "[[experiment]]\n" + toml_text(keys)
+    return Entry(name, "[[experiment]]\n" + toml_text(keys), file, _table(found, bench))
 
 
 def _table(found: Filmed, bench: Bench) -> str:
@@ -255,96 +238,9 @@ def _csv(columns: Mapping[str, Array]) -> str:
     return csv_text(columns, lambda v: f"{v:.10g}" if v == int(v) else f"{v:.6f}")
 
 
-def _pixels(found: Filmed, starts_s: float) -> str:
-    """Positions in the picture, a row for each frame with the clip's time, in the format of `read_pixels`."""
+def pixels_text(found: Filmed, starts_s: float) -> str:
+    """Positions in the picture as CSV, a row for each frame with the clip's time, for `read_pixels`."""
     columns: dict[str, Array] = {"time_s": found.time_s - starts_s}
     for name, at in zip(found.tracks.names, found.tracks.pixels, strict=True):
         columns |= {f"{name} right_px": at[:, 0], f"{name} down_px": at[:, 1]}
     return _csv(columns)
-
-
-def followed(clip: Path, bench: Bench, pressure: Path, follow: Tracker) -> Filmed:
-    """Experiment in a clip; writes nothing. Raises InputError.
-
-    follow: tracks the markers, see `Tracker`; not used if the clip is a table of pixels.
-    """
-    if not Path(clip).exists():
-        raise InputError(
-            "the clip does not exist", str(clip), "give a movie, or the first picture of a sequence"
-        )
-    recorded = read_pressure(pressure)
-    if Path(clip).suffix.lower() in SUFFIXES:
-        tracks = read_pixels(clip)
-    elif Path(clip).suffix.lower() in PROJECTS:
-        raise InputError(
-            "the file is not a text table", str(clip), "export the tracked positions in pixels as CSV"
-        )
-    else:
-        unplaced = {*bench.view.base, *(bench.view.tip or ()), *(bench.view.ruler or ())} - {
-            *bench.markers.pixels
-        }
-        if unplaced:
-            raise InputError(
-                f"marker {min(unplaced)!r} has no pixel",
-                str(clip),
-                "give its pixel position in the first frame",
-            )
-        tracks = follow(Path(clip), bench.markers)
-    return filmed(tracks, bench, recorded, str(clip))
-
-
-def track_into(
-    folder: Path, clip: Path, bench: Bench, pressure: Path, follow: Tracker, context: RunContext
-) -> None:
-    """Put a clip's experiment into a folder of measured data, as a run whose remarks are warnings.
-
-    A clip that cannot be used leaves no folder.
-    """
-    name = str(bench.experiment.get("name", Path(clip).stem))
-    with context.progress.stage("track"):
-        found = followed(clip, bench, pressure, follow)
-        file = f"{file_stem(name)}.csv"
-        # Data that `diagnose` could not read must be found before the folder is there.
-        tried(_block(name, file, bench), file, _table(found, bench))
-    context.open_folder(folder)
-    context.console_summary = console_summary
-    table, remarks = write_experiment(found, bench, name, folder)
-    remarks = (*found.remarks, *remarks)
-    for remark in remarks:
-        context.progress.warning(remark.what, remark.where, remark.remedy)
-    context.summary |= figures(found, name, table) | {"remarks": [remark.what for remark in remarks]}
-
-
-def figures(found: Filmed, name: str, table: Path) -> dict[str, Any]:
-    """Figures of an experiment from a video, in plain data."""
-    m = found.motion
-    lost = {n: int(np.isnan(p[:, 0]).sum()) for n, p in zip(m.names, m.places_mm, strict=True)}
-    return {
-        "experiment": name,
-        "file": str(table),
-        "frames": len(found.tracks),
-        "duration_s": float(found.time_s[-1] - found.time_s[0]),
-        "pressure_kPa": [float(found.pressure_kPa.min()), float(found.pressure_kPa.max())],
-        "angle_deg": None
-        if m.angle_deg is None
-        else [float(np.nanmin(m.angle_deg)), float(np.nanmax(m.angle_deg))],
-        "mm_per_pixel": m.mm_per_pixel,
-        "noise_px": m.noise_px,
-        "frames_lost": lost,
-    }
-
-
-def console_summary(summary: dict[str, Any]) -> list[str]:
-    """Lines of text on a video's `summary`."""
-    low, high = summary["pressure_kPa"]
-    lines = [
-        f"{summary['experiment']}: {summary['frames']} frames, {summary['duration_s']:.4g} s, "
-        f"{low:g} to {high:g} kPa; {summary['mm_per_pixel']:.4g} mm a pixel"
-    ]
-    if summary["angle_deg"]:
-        least, most = summary["angle_deg"]
-        lines.append(f"angle: {least:+.2f} to {most:+.2f} deg")
-    lost = {name: count for name, count in summary["frames_lost"].items() if count}
-    if lost:
-        lines.append("lost: " + ", ".join(f"{name} in {count} frames" for name, count in lost.items()))
-    return lines
