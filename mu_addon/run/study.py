@@ -89,11 +89,15 @@ class Input:
         return values[0]
 
     def write(self, name: str, value: Any) -> Written:
-        """The value in the inputs' files."""
+        """The value in the inputs' files; an attrs class is a table."""
+        value = attrs.asdict(value) if attrs.has(type(value)) else value
         return Written({name: value}) if self.decides else Written(run={name: value})
 
     def read(self, name: str, found: Found) -> Any:
-        """The value, its keys taken out of what was found; raises InputError."""
+        """The value, its keys taken out of what was found; raises InputError.
+
+        Without a method of its own, the key is read as the type of the study's field.
+        """
         raise NotImplementedError
 
     def file_names(self, name: str) -> tuple[str, ...]:
@@ -540,12 +544,12 @@ class Study:
         found = Found(path, keys, run, document.text, replaced=tuple(replaced))
         special = {}
         for name, one in cls.inputs().items():
-            if one.kind != "setting":
+            if type(one).read is not Input.read:
                 special[name] = found.given[name] = one.read(name, found)
                 continue
             if not one.decides and name in run:
                 keys[name] = run[name]
-            found.given[name] = keys.get(name, one.descriptions[0].default)
+            found.given[name] = keys.get(name, one.descriptions[0].default if one.descriptions else None)
         study = found.table.made(cls, **special).complete()
         for name in found.before:
             study._read()[name].require(name, getattr(study, name), found)

@@ -31,7 +31,7 @@ from ..run.study import (
     stage,
 )
 from ..toml_reader import TomlTable
-from .inputs import NumbersInput, TableInput
+from .inputs import NumbersInput
 
 JOINT_S = 289.0
 """Seconds in which a joint is learned at one pressure on the default mesh."""
@@ -153,9 +153,10 @@ class ReachInput(NumbersInput):
 
     def read(self, name: str, found: Found) -> tuple[float, ...]:
         """The point of the table; raises InputError."""
-        found.keys.update(found.table.inner("target").only((name,)).values)
+        table = found.table.inner("target").only((name,))
         found.keys.pop("target", None)
-        return super().read(name, found)
+        point: tuple[float, ...] = table.take(name, tuple[float, ...], ())
+        return point
 
 
 def _finer(study: Chain) -> float:
@@ -203,8 +204,8 @@ class Chain(Study):
         described("resin", USUAL_RESIN, "resin of the library, for the units' weight"), metavar="NAME"
     )
     times: int = setting(TIMES, metavar="N")
-    mesh: MeshTable = given(TableInput(of=lambda: MeshTable), factory=MeshTable)
-    joint: chain.Sampling = given(TableInput(of=lambda: chain.Sampling), factory=lambda: chain.Sampling())
+    mesh: MeshTable = given(Input("table"), factory=MeshTable)
+    joint: chain.Sampling = given(Input("table"), factory=lambda: chain.Sampling())
 
     def __attrs_post_init__(self) -> None:
         if not 1 <= len(self.units) <= MOST_UNITS:

@@ -106,9 +106,9 @@ class Import(Study):
         """The experiments in the files, with the answers to what they leave open."""
         given = dict(answers)
         found = lab_files.understand(paths, given, lambda count: tell(count / len(paths)))
-        while found.open and ask is not None and not dry and (answers := ask(found)) is not None:
+        while found.open and ask is not None and not dry and (more := ask(found)) is not None:
             # The same question of further experiments has the same answer.
-            given |= answers
+            given |= more
             found = lab_files.understand(paths, given)
         return found
 

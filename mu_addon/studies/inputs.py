@@ -29,28 +29,48 @@ def asked(of: type[Input], name: str, text: str, default: str = "", *, empty: An
 
 
 @attrs.frozen
-class UnitInput(Input):
-    """A unit, in a file of its own; needed: there is always one; default: the preset where none is given."""
+class FileInput(Input):
+    """A value in a file of its own beside the inputs; None is none.
 
-    kind: str = "unit"
+    file: its name, "{name}" in it for that of the input; text: of a value; load: the value of a file, raises
+    InputError; needed: there is always one.
+    """
+
+    kind: str = "file"
+    file: str = "{name}.toml"
+    text: Callable[[Any], str] = str
+    load: Callable[[Path], Any] = Path
     needed: bool = True
-    default: str = ""
 
-    def write(self, name: str, value: design.Unit | None) -> Written:
+    def made(self, values: tuple[Any, ...], given: Mapping[str, Any]) -> Any:
+        """The value of the file that is named; raises InputError."""
+        return self.load(Path(values[0])) if values[0] else None
+
+    def write(self, name: str, value: Any) -> Written:
         """The file's name, and its text."""
-        if value is None:
-            return Written()
-        return Written({name: UNIT}, files={UNIT: design.to_toml(value)})
+        (file,) = self.file_names(name)
+        return Written() if value is None else Written({name: file}, files={file: self.text(value)})
 
-    def read(self, name: str, found: Found) -> design.Unit | None:
-        """The unit of the folder; raises InputError."""
-        if found.keys.pop(name, None) is None and not self.needed:
+    def read(self, name: str, found: Found) -> Any:
+        """The value of the folder's file; raises InputError."""
+        if found.take(name, str, attrs.NOTHING if self.needed else None) is None:
             return None
-        return design.read_unit(found.path.parent / UNIT)
+        return self.load(found.path.parent / self.file_names(name)[0])
 
     def file_names(self, name: str) -> tuple[str, ...]:
         """Its file."""
-        return (UNIT,)
+        return (self.file.format(name=name),)
+
+
+@attrs.frozen
+class UnitInput(FileInput):
+    """A unit; default: the preset where none is given."""
+
+    kind: str = "unit"
+    file: str = UNIT
+    text: Callable[[Any], str] = lambda unit: design.to_toml(unit)
+    load: Callable[[Path], Any] = lambda path: design.read_unit(path)
+    default: str = ""
 
     def same(self, value: design.Unit | None, other: design.Unit | None) -> bool:
         """Return True if they differ in name alone."""
@@ -68,10 +88,6 @@ class WordsInput(Input):
         """The words of a text, or a list of them."""
         (value,) = values
         return tuple(value.split() if isinstance(value, str) else value or ())
-
-    def read(self, name: str, found: Found) -> tuple[str, ...]:
-        """The words of the file; raises InputError."""
-        return found.take(name, tuple[str, ...], ())
 
 
 @attrs.frozen
@@ -306,10 +322,12 @@ def _points(text: str) -> tuple[tuple[float, float, float], ...]:
 
 
 @attrs.frozen
-class PrinterInput(Input):
+class PrinterInput(FileInput):
     """A printer with its resin, and limits measured on it in place of the printer's; its values are kept."""
 
     kind: str = "printer"
+    text: Callable[[Any], str] = lambda printer: design.printer_text(printer)
+    load: Callable[[Path], Any] = lambda path: design.read_printer(path)
 
     def made(self, values: tuple[Any, ...], given: Mapping[str, Any]) -> design.Printer:
         """The printer of a name or a file, with the limits of a filled sheet; raises InputError."""
@@ -317,14 +335,6 @@ class PrinterInput(Input):
 
         printer, limits = design.load_printer(values[0]), given.get("limits")
         return printer.with_limits(measured_limits(Path(limits))) if limits else printer
-
-    def write(self, name: str, value: design.Printer) -> Written:
-        """Its file."""
-        return Written({name: f"{name}.toml"}, files={f"{name}.toml": design.printer_text(value)})
-
-    def read(self, name: str, found: Found) -> design.Printer:
-        """The printer of the folder; raises InputError."""
-        return design.read_printer(found.path.parent / str(found.keys.pop(name, "")))
 
 
 @attrs.frozen
@@ -340,22 +350,6 @@ class OnceInput(Input):
     def read(self, name: str, found: Found) -> Any:
         """The default."""
         return self.descriptions[0].default
-
-
-@attrs.frozen
-class TableInput(Input):
-    """Values in a table of their own; of: their attrs class, which is loaded when they are read."""
-
-    kind: str = "table"
-    of: Callable[[], type] = lambda: dict
-
-    def write(self, name: str, value: Any) -> Written:
-        """Its table."""
-        return Written({name: attrs.asdict(value)})
-
-    def read(self, name: str, found: Found) -> Any:
-        """The values of the table, the others by default; raises InputError."""
-        return found.take(name, self.of(), None) or self.of()()
 
 
 @attrs.frozen
@@ -379,16 +373,16 @@ class NumbersInput(Input):
         """The numbers, if there are any."""
         return Written({name: value} if value else {})
 
-    def read(self, name: str, found: Found) -> tuple[float, ...]:
-        """The numbers of the file; raises InputError."""
-        return found.take(name, tuple[float, ...], ())
-
 
 @attrs.frozen
-class ModelInput(Input):
-    """An extended model of a diagnosis, in a file of its own, or None."""
+class ModelInput(FileInput):
+    """An extended model of a diagnosis, or None."""
 
     kind: str = "model"
+    file: str = MODEL
+    text: Callable[[Any], str] = lambda model: model.text()
+    load: Callable[[Path], Any] = lambda path: evidence.load_model(path)
+    needed: bool = False
     descriptions: tuple[Any, ...] = (
         described(
             "model",
@@ -398,23 +392,6 @@ class ModelInput(Input):
         ),
     )
     metavar: str = "FILE"
-
-    def made(self, values: tuple[Any, ...], given: Mapping[str, Any]) -> evidence.ExtendedModel | None:
-        """The model of a file; raises InputError."""
-        return evidence.load_model(Path(values[0])) if values[0] else None
-
-    def write(self, name: str, value: evidence.ExtendedModel | None) -> Written:
-        """The file's name, and its text."""
-        return Written() if value is None else Written({name: MODEL}, files={MODEL: value.text()})
-
-    def read(self, name: str, found: Found) -> evidence.ExtendedModel | None:
-        """The model of the folder, if it has one; raises InputError."""
-        named = found.keys.pop(name, None)
-        return None if named is None else evidence.load_model(found.path.parent / MODEL)
-
-    def file_names(self, name: str) -> tuple[str, ...]:
-        """Its file."""
-        return (MODEL,)
 
 
 _SCHEDULER = described(
