@@ -45,7 +45,11 @@ class TomlTable:
         """File, line and name of a key, or of the table; name: of another table."""
         name = self.name if name is None else name
         number = self.nth if name == self.name else 0
-        line = _line_of(self.text, name, number, key) or (number and _line_of(self.text, name, number, ""))
+        line = _line_of(self.text, name, number, key)
+        if line is None and number:
+            line = _line_of(self.text, name, number, "")
+        elif line is None:
+            line = _line_of(self.text, f"{name}.{key}" if name else key, 0, "")
         shown = f"[[{name}]] {number}" if number and not line else f"[{name}]" if name else ""
         parts = [self.origin, f"line {line}" if line else "", f"{shown} {key}".strip()]
         return ", ".join(part for part in parts if part) or "TOML text"

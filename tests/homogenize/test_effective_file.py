@@ -71,15 +71,10 @@ def test_a_fit_becomes_a_file_that_says_where_it_is_from():
 @pytest.mark.parametrize(
     ("old", "new", "message"),
     [
-        ("format = 1", "format = 2", "format = 2"),
-        ("format = 1", "", "does not say its format"),
-        ("[law]", "[law", "not TOML"),
         ("[moduli]", "[modulus]", "unknown key 'modulus'; did you mean"),
         ("G_MPa = ", "H_MPa = ", "unknown key 'H_MPa'"),
         ("alpha_tension = 5.0\n", "", "alpha_tension is missing"),
-        ("alpha_tension = 5.0", 'alpha_tension = "5"', "alpha_tension = '5' is not a number"),
         ("alpha_tension = 5.0", "alpha_tension = nan", "alpha_tension = nan is not a finite number"),
-        ("alpha_tension = 5.0", "alpha_tension = true", "alpha_tension = True is not a number"),
         ("alpha_tension = 5.0", "alpha_tension = 0", "alpha_tension = 0 must be other than 0"),
         ("mu_tension_MPa = 0", "mu_tension_MPa = -1", "mu_tension_MPa = -1"),
         ("G_MPa = 0", "G_MPa = -1", "G_MPa = -1"),

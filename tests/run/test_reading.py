@@ -245,28 +245,6 @@ def test_damaged_files_end_in_a_clear_error(name: str, tmp_path: Path) -> None:
             reader(path)
 
 
-@pytest.mark.parametrize("name", ["unit", "printer", "material", "model", "calibration"])
-def test_true_is_no_number(name: str, tmp_path: Path) -> None:
-    reader, text = READERS[name]
-    assert text
-    path = tmp_path / "file.toml"
-    lines = text.splitlines()
-    tried = 0
-    for place, line in enumerate(lines):
-        key, equals, value = line.partition(" = ")
-        if not equals or line.startswith("#"):
-            continue
-        try:
-            float(value.split("#")[0])
-        except ValueError:
-            continue
-        path.write_text("\n".join([*lines[:place], f"{key} = true", *lines[place + 1 :]]))
-        with pytest.raises(InputError):
-            reader(path)
-        tried += 1
-    assert tried
-
-
 def test_toml_and_json() -> None:
     assert parse_toml("a = [1, 2.5]", "x") == {"a": [1, 2.5]}
     with pytest.raises(InputError, match="not TOML"):

@@ -83,18 +83,10 @@ def test_a_description_is_read(tmp_path):
 @pytest.mark.parametrize(
     ("old", "new", "what", "where"),
     [
-        ('camera = "-x"', 'camera = "-x', "not TOML", "line 2"),
         ("fps = 25", "fsp = 25", "did you mean 'fps'", "line 7"),
-        ("fps = 25", 'fps = "fast"', "fps = 'fast' is not a number", "line 7"),
         ('tip = ["left", "right"]', 'tip = "left"', "tip = 'left' is not a list of 2 texts", "line 4"),
         ('base = ["low", "high"]', "", "base is missing", "bench.toml"),
         ("place_mm = [15, 0.0]", "", "marker 'high' of the base has no place_mm", "bench.toml"),
-        (
-            "pixel = [1, 2]",
-            "pixel = [1]",
-            r"pixel = \[1\] is not a list of 2 numbers",
-            "bench.toml",
-        ),
         ("pixel = [1, 2]", "colour = 3", "unknown key 'colour'", "bench.toml"),
         ('name = "left"', 'name = "low"', "two markers are named 'low'", "bench.toml"),
         ('marks = "dots"', 'marks = "stars"', "marks = 'stars' is not known", "line 9"),
