@@ -644,7 +644,7 @@ else:
     sensor, twin = module("blender.sensor.state"), module("blender.sensor.twin")
     tracking, MarkerSettings = (
         module("blender.track.state"),
-        module("usecases.track_video.run").MarkerSettings,
+        module("measured.bench").MarkerSettings,
     )
     panel_kinds = [
         kind for kind in bpy.types.Panel.__subclasses__() if str(kind.__module__).startswith(package)

@@ -14,6 +14,7 @@ import os
 import re
 import stat
 import tomllib
+from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
@@ -78,6 +79,25 @@ def require_readable(path: str | Path, most: int = _LONGEST) -> None:
 def file_text(path: str | Path, most: int = _LONGEST) -> str:
     """The text of a regular file of UTF-8, line ends as \\n; raises OSError and UnicodeDecodeError."""
     return file_bytes(path, most).decode("utf-8-sig").replace("\r\n", "\n").replace("\r", "\n")
+
+
+def text_in(
+    path: str | Path,
+    what: str,
+    remedy: str,
+    most: int = _LONGEST,
+    read: Callable[[Any, int], str] = file_text,
+) -> str:
+    """The text of a file that a user or a run names, as `read` gives it; raises InputError.
+
+    what, remedy: of a file that cannot be read.
+    """
+    try:
+        return read(path, most)
+    except UnicodeDecodeError as error:
+        raise InputError("the file is not UTF-8 text", str(path), f"save it as UTF-8, or {remedy}") from error
+    except OSError as error:
+        raise InputError(f"cannot read the {what}: {unreadable(error)}", str(path), remedy) from error
 
 
 def _size(count: int) -> str:

@@ -55,10 +55,10 @@ class Command(NamedTuple):
 def _command(name: str) -> Command:
     from ..studies import STUDIES
 
-    if name.replace("_", "-") in STUDIES:
+    if (command := name.rstrip("_").replace("_", "-")) in STUDIES:
         from .studies import command_of
 
-        return Command(*command_of(name.replace("_", "-")))
+        return Command(*command_of(command))
     module = import_module(f".{_MODULES.get(name, name)}", __name__)
     add, run = (getattr(module, f"{what}_{name}", None) or getattr(module, what) for what in ("add", "run"))
     return Command(add, run)

@@ -10,6 +10,7 @@ if TYPE_CHECKING:
     from ..design.parameters import Unit
     from ..design.quantity import Description
     from ..run.context import RunContext
+    from ..run.study import Input
     from ..usecases.simulate_and_place.extended_unit import Extended
     from ..usecases.simulate_and_place.named_effects import NamedEffects
 
@@ -18,40 +19,37 @@ Commands = argparse._SubParsersAction
 Group = argparse._ArgumentGroup | argparse.ArgumentParser
 
 
-def add_setting(
-    command: Group,
-    d: Description,
-    metavar: Any = None,
-    many: bool | int = False,
-    alone: str = "",
-    option: str = "",
-) -> None:
+def add_setting(command: Group, d: Description, metavar: Any = None, one: Input | None = None) -> None:
     """Add the option of a setting: its type, choices, default and text; also --no-NAME of a flag that is set.
 
-    Its name is `option`, or the setting's without the unit; many: it takes several words, or so many; alone:
-    its value where it stands without one. Bounds are checked by the job. A text that is empty by default is
-    None without the option.
+    one: the study's input that it is, which says how its option differs. Bounds are checked by the job. A
+    text that is empty by default is None without the option.
     """
     unit = d.unit.replace("/", "_per_")
-    option = option or (d.name.removesuffix(f"_{unit}") if unit else d.name).replace("_", "-")
+    name = (one and one.option) or (d.name.removesuffix(f"_{unit}") if unit else d.name).replace("_", "-")
     if d.type is bool and d.default:
         both = argparse.BooleanOptionalAction
-        command.add_argument(f"--{option}", dest=d.name, action=both, default=True, help=help_of(d))
-    elif d.type is bool:
-        words = f"{d.text[:1].upper()}{d.text[1:]}."
-        command.add_argument(f"--{option}", dest=d.name, action="store_true", help=words)
-    else:
-        command.add_argument(
-            f"--{option}",
-            dest=d.name,
-            type=d.type,
-            choices=d.choices or None,
-            default=d.default if d.default != "" else None,
-            metavar=metavar,
-            nargs="+" if many is True else many or ("?" if alone else None),
-            const=alone or None,
-            help=help_of(d),
-        )
+        command.add_argument(f"--{name}", dest=d.name, action=both, default=True, help=help_of(d))
+        return
+    if d.type is bool:
+        command.add_argument(f"--{name}", dest=d.name, action="store_true", help=sentence(d.text))
+        return
+    more: dict[str, Any] = {"metavar": metavar, "help": help_of(d)}
+    if one is not None:
+        many = "+" if one.many is True else one.many or ("?" if one.alone else None)
+        more = {"metavar": one.metavar, "nargs": many, "const": one.alone or None, "required": one.required}
+        more["help"] = sentence(d.text) if one.required or one.repeated else help_of(d)
+        more |= {"action": "append"} if one.repeated else {}
+    default = d.default if d.default != "" else None
+    more = {key: value for key, value in more.items() if value is not None}
+    command.add_argument(
+        f"--{name}", dest=d.name, type=d.type, choices=d.choices or None, default=default, **more
+    )
+
+
+def sentence(text: str, end: str = ".") -> str:
+    """A setting's text as a sentence of help."""
+    return f"{text[:1].upper()}{text[1:]}{end}"
 
 
 def help_of(d: Description, default: str = "") -> str:
@@ -59,7 +57,7 @@ def help_of(d: Description, default: str = "") -> str:
     own = {True: "yes", False: "no"}.get(d.default, d.default) if d.type is bool else d.default
     text, _, empty = d.text.partition("; empty: ")
     shown = default or empty or f"{f'{own:g}' if d.type is float else own} {d.unit}".rstrip()
-    return f"{text[:1].upper()}{text[1:]} (default: {shown})."
+    return f"{sentence(text, '')} (default: {shown})."
 
 
 def add_results(command: argparse.ArgumentParser) -> None:

@@ -10,7 +10,6 @@ from typing import TYPE_CHECKING, Any
 
 from ..studies import study
 from .options import (
-    add_measured_folder,
     add_model,
     add_obstacles,
     add_orientation,
@@ -22,6 +21,7 @@ from .options import (
     modelled_unit,
     presets,
     require_out,
+    sentence,
     unit_if_named,
 )
 
@@ -46,16 +46,6 @@ def _unit(options: argparse.Namespace, context: RunContext, one: Any, values: di
     return load_preset(one.default) if found is None and one.default else found
 
 
-def _add_measured(command: Any, one: Any) -> None:
-    add_measured_folder(command, one.text)
-
-
-def _measured(options: argparse.Namespace, context: RunContext, one: Any, values: Any) -> Any:
-    from ..measured import read_folder
-
-    return read_folder(Path(options.folder))
-
-
 def _add_gripper(command: Any, one: Any) -> None:
     which = command.add_mutually_exclusive_group(required=True)
     which.add_argument("--preset", metavar="NAME", help=f"Gripper preset: {presets('gripper')}.")
@@ -68,39 +58,14 @@ def _gripper(options: argparse.Namespace, context: RunContext, one: Any, values:
     return load_gripper(options.preset) if options.preset is not None else read_gripper(options.gripper)
 
 
-def _add_bending(command: Any, one: Any) -> None:
-    words = "Recordings, or folders of measured data of the kind waveguide_bending."
-    command.add_argument("data", nargs="+", metavar="FOLDER", help=words)
-
-
-def _bending(options: argparse.Namespace, context: RunContext, one: Any, values: Any) -> Any:
-    return tuple(map(Path, options.data))
-
-
-def _add_file(command: Any, one: Any) -> None:
+def _add_plan(command: Any, one: Any) -> None:
     command.add_argument("file", metavar="FILE", help=one.text)
-
-
-def _design(options: argparse.Namespace, context: RunContext, one: Any, values: Any) -> Any:
-    from ..optimization import read_design
-
-    return read_design(Path(options.file))
 
 
 def _plan(options: argparse.Namespace, context: RunContext, one: Any, values: Any) -> Any:
     from ..usecases.parameter_study.plan import read_plan
 
     return read_plan(Path(options.file)).continued(Path(options.out) / "sweep.toml", options.add)
-
-
-def _add_model(command: Any, one: Any) -> None:
-    add_model(command)
-
-
-def _model(options: argparse.Namespace, context: RunContext, one: Any, values: Any) -> Any:
-    from ..evidence import load_model
-
-    return None if options.model is None else load_model(Path(options.model))
 
 
 def _add_effects(command: Any, one: Any) -> None:
@@ -124,16 +89,19 @@ def _obstacles(options: argparse.Namespace, context: RunContext, one: Any, value
     return obstacles_for(values["unit"], options.obstacles, values["body"]) if options.obstacles else ()
 
 
-OBJECTS = {
+def _ask(options: argparse.Namespace, context: RunContext, one: Any, values: Any) -> Any:
+    from .asking import asker
+
+    return asker(options)
+
+
+OBJECTS: dict[str, tuple[Callable[..., None], Callable[..., Any]]] = {
     "unit": (_add_unit, _unit),
     "gripper": (_add_gripper, _gripper),
-    "measured": (_add_measured, _measured),
-    "bending": (_add_bending, _bending),
-    "design": (_add_file, _design),
     "effects": (_add_effects, _effects),
-    "model": (_add_model, _model),
     "obstacles": (_add_obstacles, _obstacles),
-    "plan": (_add_file, _plan),
+    "plan": (_add_plan, _plan),
+    "ask": (lambda command, one: None, _ask),
 }
 """By kind of an input that is no plain value: its options are added, its value made of them."""
 
@@ -173,7 +141,8 @@ def _add(commands: Commands[Any], kind: type[Study], name: str) -> None:
         elif one.kind in OBJECTS:
             OBJECTS[one.kind][0](groups[one.group], one)
     add_results(command)
-    add_report(command)
+    if not kind.joins:
+        add_report(command)
 
 
 def _dest(one: Input) -> str:
@@ -184,8 +153,12 @@ def _dest(one: Input) -> str:
 def _add_values(command: Any, one: Input) -> None:
     """The option of an input's plain values."""
     first = one.descriptions[0]
+    if one.argument:
+        many: dict[str, Any] = {"nargs": "+"} if one.many else {}
+        command.add_argument(first.name, metavar=one.argument, help=sentence(first.text), **many)
+        return
     if len(one.descriptions) == 1:
-        add_setting(command, first, one.metavar, one.many, one.alone, one.option)
+        add_setting(command, first, one=one)
         return
     defaults = [d.default for d in one.descriptions]
     shown = " ".join(f"{value:g}" for value in defaults)
@@ -195,7 +168,7 @@ def _add_values(command: Any, one: Input) -> None:
         type=first.type,
         default=defaults,
         metavar=one.metavar,
-        help=f"{first.text[:1].upper()}{first.text[1:]} (default: {shown}).",
+        help=f"{sentence(first.text, '')} (default: {shown}).",
     )
 
 

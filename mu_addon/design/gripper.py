@@ -15,7 +15,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..errors import InputError
-from ..reading import file_text
+from ..reading import text_in
+from ..toml_reader import parsed_toml
 from . import shapes, toml_text
 from .anchors import window
 from .assets import asset_file, asset_names
@@ -306,37 +307,25 @@ def from_toml(text: str, origin: str = "", beside: Path | None = None) -> Grippe
     """
     keys = {"": ["format", "kind", "name", "unit", "path"]}
     keys |= {section.section: [d.name for d in describe(section)] for section in SECTIONS}
-    document = toml_text.parse(text, keys, origin)
-    with toml_text.located(text, origin):
-        if (document.get("format"), document.get("kind")) != (FORMAT, KIND) or document["format"] is True:
-            raise InputError(
-                f"the file is not a gripper of format {FORMAT}",
-                "kind",
-                f'write format = {FORMAT} and kind = "{KIND}", or give a gripper file instead of a unit file',
-            )
-        named = document.get("unit")
-        if not isinstance(named, str) or not named:
-            raise InputError("the fingers' unit is missing", "unit", "name a preset, such as mu-1.0x")
+    table = parsed_toml(text, origin).only_tables(keys).of_format(FORMAT)
+    document = table.values
+    if document.get("kind") != KIND:
+        remedy = f'write kind = "{KIND}", or give a gripper file instead of a unit file'
+        raise InputError("the file is not a gripper", table.at("kind"), remedy)
+    named = table.word("unit")
+    with table.located():
         sections = {s.section: s(**document.get(s.section, {})) for s in SECTIONS}
         rest = {key: document[key] for key in ("name", "path") if key in document}
     from_file = named.endswith(".toml")
     unit = read_unit((beside or Path()) / named) if from_file else load_preset(named)
-    with toml_text.located(text, origin):
+    with table.located():
         return Gripper(unit=unit, **rest, **sections)
 
 
 def read_gripper(path: str | Path) -> Gripper:
     """The gripper in a TOML file. Raises InputError with file, line and remedy."""
     path = Path(path)
-    try:
-        text = file_text(path)
-    except OSError as error:
-        raise InputError(
-            f"cannot read the gripper: {error.strerror or error}", str(path), "give a gripper's TOML file"
-        ) from error
-    except UnicodeDecodeError as error:
-        raise InputError("the file is not UTF-8 text", str(path), "save it as UTF-8") from error
-    return from_toml(text, str(path), path.parent)
+    return from_toml(text_in(path, "gripper", "give a gripper's TOML file"), str(path), path.parent)
 
 
 def gripper_names() -> list[str]:

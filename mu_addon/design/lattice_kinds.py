@@ -19,9 +19,8 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from ..errors import InputError
-from ..reading import file_text
+from ..toml_reader import read_toml
 from .assets import asset_file, asset_names
-from .toml_text import parse
 
 Array = NDArray[np.float64]
 RadiusLaw = Callable[[Array, float, float], Array]
@@ -224,13 +223,7 @@ def kind(name: str, struts: str = "") -> LatticeKind:
 
 def read_struts(path: Path) -> str:
     """The canonical text of the struts in a file of a lattice kind. Raises InputError."""
-    try:
-        text = file_text(path)
-    except (OSError, UnicodeDecodeError) as error:
-        raise InputError(f"cannot read the lattice kind: {error}", str(path), "give a TOML file") from error
-    struts = parse(text, {"": ("struts",)}, str(path)).get("struts")
-    if not isinstance(struts, str):
-        raise InputError("there are no struts", str(path), f"write struts = {_EXAMPLE}")
+    struts = read_toml(path, "lattice kind", "give a TOML file").only(("struts",)).word("struts")
     return text_of(parsed(path.stem, struts, str(path)))
 
 

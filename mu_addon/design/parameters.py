@@ -12,7 +12,8 @@ import attrs
 
 from ..errors import InputError, did_you_mean
 from ..files import write_bytes
-from ..reading import file_text
+from ..reading import text_in
+from ..toml_reader import parsed_toml
 from . import lattice_kinds, rules, toml_text
 from .assets import asset_file, asset_names
 from .dimensions import Dimensions
@@ -591,18 +592,9 @@ def from_toml(text: str, origin: str = "", beside: Path | None = None) -> Unit:
     """
     head = {"format": int, "name": str, **{d.name: d.type for d in describe(Unit)}}
     keys = {"": list(head)} | {_attribute(s): [d.name for d in describe(s)] for s in SECTIONS}
-    document = toml_text.parse(text, keys, origin)
-    with toml_text.located(text, origin):
-        if "format" not in document:
-            raise InputError(
-                "the file does not say its format", "format", f"add format = {FORMAT} at its top"
-            )
-        if document["format"] != FORMAT or document["format"] is True:
-            raise InputError(
-                f"format = {document['format']} is not known here",
-                "format",
-                f"write format = {FORMAT}, the only one so far",
-            )
+    table = parsed_toml(text, origin).only_tables(keys).of_format(FORMAT)
+    document = table.values
+    with table.located():
         _take_kind(document.get("lattice", {}), beside or Path())
         sections = {_attribute(s): s(**document.get(_attribute(s), {})) for s in SECTIONS}
         require_used(sections["wall"], document.get("wall", {}))
@@ -626,17 +618,7 @@ def _take_kind(lattice: dict[str, Any], folder: Path) -> None:
 def read_unit(path: str | Path) -> Unit:
     """The unit in a TOML file. Raises InputError with file, line and remedy."""
     path = Path(path)
-    try:
-        text = file_text(path)
-    except OSError as error:
-        raise InputError(
-            f"cannot read the unit: {error.strerror or error}",
-            str(path),
-            "give the path of a unit's TOML file",
-        ) from error
-    except UnicodeDecodeError as error:
-        raise InputError("the file is not UTF-8 text", str(path), "save it as UTF-8") from error
-    return from_toml(text, str(path), path.parent)
+    return from_toml(text_in(path, "unit", "give the path of a unit's TOML file"), str(path), path.parent)
 
 
 def write_unit(unit: Unit, path: str | Path) -> None:

@@ -5,14 +5,13 @@ from __future__ import annotations
 import math
 from collections.abc import Iterable, Mapping
 from pathlib import Path
-from typing import Any
 
 import attrs
 
 from ..errors import InputError
 from ..files import write_text
 from ..homogenize.offset_response import OffsetResponse
-from ..reading import file_text, is_number, parse_toml
+from ..toml_reader import TomlTable, read_toml
 from ..toml_writer import Commented, toml_text
 from .effect import SLIP, Parameter
 from .effects import DECLARED
@@ -138,59 +137,32 @@ def load_model(path: Path) -> ExtendedModel:
     Raises InputError if the file cannot be read, is not TOML or lacks a verdict; for a table of another type,
     an effect that is not declared, a parameter without a finite value and an unusable table [lattice].
     """
-    try:
-        text = file_text(path)
-    except OSError as error:
-        raise InputError(
-            f"cannot read {path}: {error.strerror}", str(path), "run `diagnose` on a folder first"
-        ) from error
-    except UnicodeDecodeError as error:
-        raise InputError("the model is not UTF-8 text", str(path), "give a model.toml") from error
-    document = parse_toml(text, str(path))
-    if not isinstance(document.get("verdict"), str):
+    document = read_toml(path, "model", "run `diagnose` on a folder first")
+    if not isinstance(document.values.get("verdict"), str):
         raise InputError("this is no model: it has no verdict", str(path), "give model.toml of `diagnose`")
-    for table in ("effect", "nuisance", "lattice"):
-        if not isinstance(document.get(table, {}), dict):
-            raise InputError(f"{table} is not a table", str(path), f"write it as [{table}]")
-    rivals = document.get("rivals", [])
-    if not isinstance(rivals, list) or not all(isinstance(title, str) for title in rivals):
-        raise InputError(
-            "rivals is not a list of names", str(path), "write it as diagnose does, or leave it out"
-        )
     effects = {}
-    for name, parameters in document.get("effect", {}).items():
+    named = document.inner("effect")
+    for name in named.values:
         if name not in DECLARED:
-            raise InputError(f"no effect {name!r} is known", f"{path}, [effect.{name}]", ", ".join(DECLARED))
-        if not isinstance(parameters, dict):
-            raise InputError(f"effect.{name} is not a table", str(path), f"write [effect.{name}.PARAMETER]")
-        effects[name] = {p: _fitted(path, f"effect.{name}.{p}", table) for p, table in parameters.items()}
-    nuisances = {n: _fitted(path, f"nuisance.{n}", t) for n, t in document.get("nuisance", {}).items()}
-    lattice = _response(path, document["lattice"]) if "lattice" in document else None
-    return ExtendedModel(document["verdict"], effects, nuisances, lattice, tuple(rivals))
+            raise InputError(f"no effect {name!r} is known", named.at(name), ", ".join(DECLARED))
+        effects[name] = _fitted(named.inner(name))
+    lattice = _response(document.inner("lattice")) if "lattice" in document else None
+    nuisances = _fitted(document.inner("nuisance"))
+    return ExtendedModel(document.word("verdict"), effects, nuisances, lattice, document.words("rivals"))
 
 
-def _response(path: Path, table: Any) -> OffsetResponse:
-    try:
-        rows = [table[n] for n in _RESPONSE]
-        if not all(isinstance(row, list) and all(map(is_number, row)) for row in rows):
-            raise ValueError("it needs lists of numbers")
+def _response(table: TomlTable) -> OffsetResponse:
+    rows = [table.take(name, tuple[float, ...]) for name in _RESPONSE]
+    with table.located():
         return OffsetResponse(*rows)
-    except (InputError, KeyError, TypeError, ValueError) as error:
-        raise InputError(
-            f"[lattice] holds no response to a print offset: {error}",
-            str(path),
-            f"give {', '.join(_RESPONSE)}, or leave the table out",
-        ) from error
 
 
-def _fitted(path: Path, name: str, table: Any) -> Fitted:
-    value = table.get("value") if isinstance(table, dict) else None
-    if not isinstance(value, int | float) or isinstance(value, bool) or not math.isfinite(value):
-        raise InputError(f"[{name}] has no value", str(path), "write value = and a number")
-    others = {k: table.get(k, math.nan) for k in ("sd", "low95", "high95")}
-    wrong = [k for k, v in others.items() if not is_number(v)]
-    if wrong:
-        raise InputError(
-            f"{wrong[0]} of [{name}] is no number", str(path), f"write {wrong[0]} = and a number"
-        )
-    return Fitted(float(value), unit=str(table.get("unit", "")), **others)
+def _fitted(table: TomlTable) -> dict[str, Fitted]:
+    """What was fitted, by name, of tables that may have other keys."""
+    found = {}
+    for name in table.values:
+        one = table.inner(name)
+        value = one.number("value")
+        sd, low, high = (one.take(key, float, math.nan) for key in ("sd", "low95", "high95"))
+        found[name] = Fitted(value, sd, low, high, one.take("unit", str, ""))
+    return found

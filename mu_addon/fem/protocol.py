@@ -12,7 +12,7 @@ import numpy as np
 
 from ..errors import InputError
 from ..measured.kinds import CONVERTED
-from ..reading import require_rows
+from ..reading import require_rows, text_in
 from ..table_cells.own_tables import own_lines, own_rows, own_text
 
 Array = np.ndarray[Any, Any]
@@ -124,12 +124,7 @@ def read_protocol_text(path: Path, columns: Sequence[str]) -> ProtocolText:
 
     columns: the names to ask for. Raises InputError where the file is unreadable, too long or empty.
     """
-    try:
-        lines = own_lines(own_text(path, _LONGEST))
-    except OSError as error:
-        raise InputError(f"cannot read the protocol: {error.strerror}", str(path), "check the path") from None
-    except UnicodeDecodeError:
-        raise InputError("the protocol is not a text file", str(path), "save it as UTF-8 CSV") from None
+    lines = own_lines(text_in(path, "protocol", "check the path", _LONGEST, own_text))
     numbered = [(n, words) for n, line in lines if (words := line.split("#")[0].strip())]
     require_rows(len(numbered) - 1, str(path))
     if not numbered:

@@ -21,15 +21,14 @@ from pathlib import Path
 from typing import Any
 
 from ..errors import InputError
-from ..reading import file_text, is_number, parse_toml, unreadable
+from ..toml_reader import TomlTable, parsed_toml, read_toml
 from ..toml_writer import toml_text
 from .tree import Node, NodeTree, Source
 
 FORMAT = 1
 HEADER = "# A node tree; `run.py graph` evaluates it."
 # Far more than any tree that somebody wires.
-MOST_BYTES, MOST_NODES = 1 << 22, 10_000
-_KEYS = ("kind", "settings", "links", "muted", "at", "frame")
+MOST_NODES = 10_000
 
 
 def tree_text(tree: NodeTree, run: Mapping[str, Any] | None = None) -> str:
@@ -56,86 +55,53 @@ def tree_text(tree: NodeTree, run: Mapping[str, Any] | None = None) -> str:
 
 def read_tree(path: str | Path) -> NodeTree:
     """The tree in a TOML file; raises InputError with the fault and its place."""
-    try:
-        text = file_text(path, MOST_BYTES)
-    except (OSError, UnicodeDecodeError) as error:
-        raise InputError(
-            f"cannot read the node tree: {unreadable(error)}", str(path), "give the TOML file of a node tree"
-        ) from error
-    return parse_tree(text, str(path))
+    return tree_of(read_toml(Path(path), "node tree", "give the TOML file of a node tree"))
 
 
 def parse_tree(text: str, origin: str = "node tree") -> NodeTree:
     """The tree in TOML text; raises InputError. The meaning of nodes is checked by `check.faults`."""
-    return tree_of(parse_toml(text, origin), origin)
+    return tree_of(parsed_toml(text, origin))
 
 
-def tree_of(document: Mapping[str, Any], origin: str) -> NodeTree:
+def tree_of(document: TomlTable) -> NodeTree:
     """The tree in a TOML document; raises InputError."""
-    found = document.get("format")
-    if found != FORMAT or isinstance(found, bool):
-        raise InputError(
-            f"format = {'missing' if found is None else repr(found)} is not known here",
-            origin,
-            f"write format = {FORMAT}; a newer version of the program may have written the file",
-        )
-    for key in document:
-        if key not in ("format", "name", "nodes", "run"):
-            raise InputError(f"unknown key {key!r}", origin, "known: format, name, nodes, run")
-    name, nodes = document.get("name", "node tree"), document.get("nodes", {})
-    if not _is_name(name):
-        raise InputError(f"name = {name!r} is not a name", origin, "give one line of text")
-    if not isinstance(nodes, Mapping) or not nodes:
-        raise InputError("there are no nodes", f"{origin}, [nodes]", "write a table [nodes.NAME] for each")
-    if len(nodes) > MOST_NODES:
-        raise InputError(f"there are more than {MOST_NODES} nodes", f"{origin}, [nodes]", "divide the tree")
-    return NodeTree(str(name), {key: _node(key, table, origin) for key, table in nodes.items()})
+    document.of_format(FORMAT).only(("format", "name", "nodes", "run"))
+    name, nodes = document.word("name", default="node tree"), document.inner("nodes")
+    _require_name(name, document.at("name"))
+    if not nodes.values:
+        raise InputError("there are no nodes", nodes.at(), "write a table [nodes.NAME] for each")
+    if len(nodes.values) > MOST_NODES:
+        raise InputError(f"there are more than {MOST_NODES} nodes", nodes.at(), "divide the tree")
+    return NodeTree(name, {key: _node(key, nodes) for key in nodes.values})
 
 
-def _node(name: str, table: Any, origin: str) -> Node:
-    where = f"{origin}, [nodes.{name}]"
-    if not _is_name(name):
-        raise InputError(f"{name!r} is not a name", where, "give one line of 1 to 120 printable characters")
-    if not isinstance(table, Mapping):
-        raise InputError(f"{table!r} is not a table", where, "write it as a table")
-    for key in table:
-        if key not in _KEYS:
-            raise InputError(f"unknown key {key!r}", where, f"known: {', '.join(_KEYS)}")
-    kind, muted, frame = table.get("kind"), table.get("muted", False), table.get("frame", "")
-    settings, links, at = table.get("settings", {}), table.get("links", {}), table.get("at", [0.0, 0.0])
-    for key, good, words in (
-        ("kind", isinstance(kind, str) and kind, "the kind of node, in quotes"),
-        ("muted", isinstance(muted, bool), "true or false"),
-        ("frame", isinstance(frame, str), "text in quotes"),
-        ("settings", isinstance(settings, Mapping), "a table of settings"),
-        ("links", isinstance(links, Mapping), "a table of links"),
-        ("at", isinstance(at, list) and len(at) == 2 and all(map(is_number, at)), "two numbers"),
-    ):
-        if not good:
-            raise InputError(f"{key} = {table.get(key)!r} does not fit", where, f"give {words}")
+def _node(name: str, nodes: TomlTable) -> Node:
+    _require_name(name, nodes.at(name))
+    table = nodes.inner(name).only(("kind", "settings", "links", "muted", "at", "frame"))
+    links = table.inner("links")
     return Node(
-        kind=str(kind),
-        settings=dict(settings),
-        links={key: _sources(value, f"{where}, links, {key}") for key, value in links.items()},
-        muted=muted,
-        at=(float(at[0]), float(at[1])),
-        frame=frame,
+        kind=table.word("kind"),
+        settings=dict(table.inner("settings").values),
+        links={key: _sources(links, key) for key in links.values},
+        muted=table.take("muted", bool, False),
+        at=table.take("at", tuple[float, float], (0.0, 0.0)),
+        frame=table.take("frame", str, ""),
     )
 
 
-def _sources(value: Any, where: str) -> tuple[Source, ...]:
-    texts = [value] if isinstance(value, str) else value
-    if not isinstance(texts, list) or not texts or not all(isinstance(text, str) for text in texts):
-        raise InputError(f"{value!r} is not a link", where, 'give "NODE.OUTPUT", or several in an array')
+def _sources(links: TomlTable, key: str) -> tuple[Source, ...]:
+    texts = (links.word(key),) if isinstance(links.values[key], str) else links.words(key)
     found = []
-    for text in texts:
+    for text in texts or ("",):
         # Names of nodes may hold dots, those of outputs do not.
         node, dot, output = text.rpartition(".")
         if not (dot and node and output):
-            raise InputError(f"{text!r} is not a link", where, 'give "NODE.OUTPUT"')
+            raise InputError(f"{text!r} is not a link", links.at(key), 'give "NODE.OUTPUT", or several in []')
         found.append(Source(node, output))
     return tuple(found)
 
 
-def _is_name(value: Any) -> bool:
-    return isinstance(value, str) and 0 < len(value) <= 120 and value.isprintable()
+def _require_name(value: str, where: str) -> None:
+    if not (0 < len(value) <= 120 and value.isprintable()):
+        what = f"{value!r} is not a name"
+        raise InputError(what, where, "give one line of 1 to 120 printable characters")

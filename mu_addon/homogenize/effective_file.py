@@ -16,7 +16,8 @@ from ..errors import InputError
 from ..fem.lattice_law import LatticeLaw
 from ..fem.laws import Foam
 from ..files import write_text
-from ..reading import file_text, parse_toml
+from ..reading import text_in
+from ..toml_reader import TomlTable, parsed_toml
 from ..toml_writer import Commented, toml_text
 from .foam_fit import NAME, FoamFit, Misfit, lattice_law, require_stable, stable_pressed, stable_shear
 
@@ -196,16 +197,7 @@ def read_effective(path: str | Path) -> Effective:
 
     Raises InputError where the file cannot be read or is not text, and as `parse_effective`.
     """
-    path = Path(path)
-    try:
-        text = file_text(path)
-    except OSError as error:
-        raise InputError(
-            f"cannot read the lattice's law: {error.strerror}", str(path), "give an effective.toml"
-        ) from None
-    except UnicodeDecodeError:
-        raise InputError("the lattice law is not a text file", str(path), "give an effective.toml") from None
-    return parse_effective(text, str(path))
+    return parse_effective(text_in(path, "lattice's law", "give an effective.toml"), str(path))
 
 
 def parse_effective(text: str, origin: str = "effective.toml") -> Effective:
@@ -214,23 +206,13 @@ def parse_effective(text: str, origin: str = "effective.toml") -> Effective:
     Raises InputError with file and key if the format is unknown, a key is missing, unknown or not a number,
     or the law is inadmissible or unstable.
     """
-    document = parse_toml(text, origin)
-    found = document.get("format")
-    if found != FORMAT or isinstance(found, bool):
-        what = "it states no format" if found is None else f"its format is {found!r}"
-        raise InputError(
-            f"the lattice's law cannot be read: {what}",
-            f"{origin}, format",
-            f"give a file of format {FORMAT}, as `run.py homogenize` writes it",
-        )
-    known = {"format", _DERIVED, *_KEYS, *_FREE}
-    for name in document:
-        if name not in known:
-            raise InputError(f"unknown table [{name}]", origin, f"known here: {', '.join(sorted(known))}")
-    rows = {name: _table(document, name, keys, origin) for name, keys in _KEYS.items()}
+    document = parsed_toml(text, origin)
+    document.of_format(FORMAT, f"give a file of format {FORMAT}, as `run.py homogenize` writes it")
+    document.only(("format", _DERIVED, *_KEYS, *_FREE))
+    rows = {name: _numbers(document.inner(name), keys) for name, keys in _KEYS.items()}
     law, fit, moduli = rows["law"], rows["fit"], rows["moduli"]
-    free = {name: _described(document, name, origin) for name in _FREE}
-    try:
+    free = {name: _described(document.inner(name)) for name in _FREE}
+    with document.located():
         return Effective(
             cell=free["cell"],
             resin=free["resin"],
@@ -242,39 +224,21 @@ def parse_effective(text: str, origin: str = "effective.toml") -> Effective:
             misfit=Misfit(fit["misfit_tension"], fit["misfit_compression"], fit["misfit_lateral"]),
             provenance=free["provenance"],
         )
-    except InputError as error:
-        raise InputError(error.what, f"{origin}, {error.where}", error.remedy) from None
 
 
-def _table(document: dict[str, Any], name: str, keys: tuple[str, ...], origin: str) -> dict[str, Any]:
+def _numbers(table: TomlTable, keys: tuple[str, ...]) -> dict[str, float]:
     """The finite numbers of a table, every one of `keys`, and no other key."""
-    rows = document.get(name)
-    if not isinstance(rows, dict):
-        raise InputError(f"the table [{name}] is missing", origin, f"give it with {', '.join(keys)}")
-    for key in rows:
-        if key not in keys:
-            raise InputError(f"unknown key {key!r}", f"{origin}, [{name}]", f"known here: {', '.join(keys)}")
-    found = {}
-    for key in keys:
-        where = f"{origin}, [{name}] {key}"
-        if key not in rows:
-            raise InputError(f"the key {key!r} is missing", where, f"give {', '.join(keys)}")
-        value = rows[key]
-        if key == "name":
-            if value != NAME:
-                raise InputError(f"there is no law {value!r} for a lattice", where, f'write "{NAME}"')
-            continue
-        if isinstance(value, bool) or not isinstance(value, int | float) or not np.isfinite(value):
-            raise InputError(f"{key} = {value!r} is not a finite number", where, "give a number")
-        found[key] = float(value)
-    return found
+    table.only(keys)
+    if "name" in keys:
+        table.word("name", (NAME,))
+    return {key: table.number(key) for key in keys if key != "name"}
 
 
-def _described(document: dict[str, Any], name: str, origin: str) -> dict[str, str | float]:
-    rows = document.get(name, {})
-    if not isinstance(rows, dict) or not all(isinstance(v, str | int | float) for v in rows.values()):
-        raise InputError(f"[{name}] is not a table of text and numbers", origin, "write one key a line")
-    return rows
+def _described(table: TomlTable) -> dict[str, str | float]:
+    for key, value in table.values.items():
+        if not isinstance(value, str | int | float):
+            raise InputError(f"{key} is neither a text nor a number", table.at(key), "write one key a line")
+    return dict(table.values)
 
 
 def _require_moduli(found: Effective) -> None:

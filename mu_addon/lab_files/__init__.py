@@ -3,5 +3,21 @@
 `source` gives rows of cells in one of `formats`, `blocks` finds the tables in them, `cells` reads columns as
 numbers, `columns` knows titles and units. A `proposal` is one immutable table of the columns that are read;
 `steps` names in order the functions that make an experiment of it, each of which decides one thing and says
-why. `decisions` lists which function decides what.
+why. `decisions` lists which function decides what. `understood` reads whole files, `tracked_table` those of
+trackers.
 """
+
+from typing import TYPE_CHECKING
+
+from ..lazy import public_face
+
+if TYPE_CHECKING:
+    from .proposal import Proposal as Proposal
+    from .proposal import Question as Question
+    from .tracked_table import PROJECTS as PROJECTS
+    from .tracked_table import SUFFIXES as SUFFIXES
+    from .tracked_table import read_pixels as read_pixels
+    from .understood import Understood as Understood
+    from .understood import understand as understand
+else:
+    __getattr__, __dir__, __all__ = public_face(__name__)

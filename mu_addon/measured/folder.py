@@ -4,18 +4,18 @@ from __future__ import annotations
 
 import hashlib
 import math
-import re
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
 import attrs
 import numpy as np
 
-from ..errors import InputError, did_you_mean
-from ..reading import file_bytes, file_text, parse_toml
+from ..errors import InputError
+from ..reading import file_bytes, text_in
 from ..run.inputs import digest
 from ..table_cells.own_tables import own_text
+from ..toml_reader import TomlTable, read_toml
 from .experiment import Array, Experiment
 from .kinds import ACCURACIES, AXES, KINDS, MODES, PLATES, ROLES, VALVES, Kind
 from .table import Remark, read_table
@@ -53,26 +53,16 @@ def read_folder(folder: Path) -> Measured:
     or key, and remedy.
     """
     path = Path(folder) / FILE
-    text = _text(path, f"a folder of measured data holds {FILE}, which names its CSV files")
-    document = parse_toml(text, str(path))
-    entries = document.pop("experiment", None)
-    if document:
-        key = next(iter(document))
-        raise InputError(
-            f"unknown key {key!r}{did_you_mean(key, ['experiment'])}",
-            _place(path, text, 0, key),
-            "define every experiment under [[experiment]]",
-        )
-    if not isinstance(entries, list) or not entries:
+    remedy = f"a folder of measured data holds {FILE}, which names its CSV files"
+    document = read_toml(path, "experiments", remedy).only(("experiment",))
+    entries = document.tables("experiment")
+    if not entries:
         raise InputError("no experiment is defined", str(path), "begin each with a line [[experiment]]")
     experiments: list[Experiment] = []
     remarks: list[Remark] = []
-    for number, entry in enumerate(entries, 1):
-        at = _Place(path, text, number)
-        if not isinstance(entry, dict):
-            raise InputError("an experiment is not a table", at(), "begin each with a line [[experiment]]")
-        found, notes = _experiment(entry, at)
-        _check_apart(found, experiments, at)
+    for entry in entries:
+        found, notes = _experiment(entry, path.parent)
+        _check_apart(found, experiments, entry)
         experiments.append(found)
         remarks += notes
     _require_gauge_pressures(experiments, entries)
@@ -93,35 +83,19 @@ def _as_run(experiments: Sequence[Experiment], path: Path) -> tuple[Experiment, 
     return tuple(sorted(experiments, key=lambda e: e.run_order or 0.0))
 
 
-@attrs.frozen
-class _Place:
-    """Location of the keys of the n-th experiment."""
-
-    path: Path
-    text: str
-    number: int
-
-    def __call__(self, key: str = "") -> str:
-        return _place(self.path, self.text, self.number, key)
-
-
-def _experiment(entry: dict[str, Any], at: _Place) -> tuple[Experiment, list[Remark]]:
-    kind = KINDS[_choice(entry, "kind", tuple(KINDS), at)]
-    for key in entry:
-        if key not in kind.keys:
-            elsewhere = [k.name for k in KINDS.values() if key in k.keys]
-            hint = f"; it belongs to {', '.join(elsewhere)}" if elsewhere else did_you_mean(key, kind.keys)
-            raise InputError(f"unknown key {key!r}{hint}", at(key), f"known here: {', '.join(kind.keys)}")
-    for key in ("name", "file", *kind.needs_keys):
+def _experiment(entry: TomlTable, folder: Path) -> tuple[Experiment, list[Remark]]:
+    kind = KINDS[entry.word("kind", tuple(KINDS))]
+    entry.only(kind.keys, {f"to {k.name}": k.keys for k in KINDS.values()})
+    for key in kind.needs_keys:
         if key not in entry:
-            raise InputError(f"key {key!r} is missing", at(), f"{kind.name} needs it")
-    fields = _described(entry, kind, at)
-    path = _file(_word(entry, "file", at), at)
-    text = _text(path, f"{FILE} names it; correct the name or put the file there", own_text)
+            raise InputError(f"{key} is missing", entry.at(), f"{kind.name} needs it")
+    fields, path = _described(entry, kind), _file(entry, folder)
+    remedy = f"{FILE} names it; correct the name or put the file there"
+    text = text_in(path, "data", remedy, read=own_text)
     table = read_table(text, kind, path)
     columns, remarks = dict(table.columns), list(table.remarks)
     if "pressure_kPa" in columns:
-        columns["pressure_kPa"] = _gauge_pressure(columns["pressure_kPa"], entry, at)
+        columns["pressure_kPa"] = _gauge_pressure(columns["pressure_kPa"], entry)
     if kind.name in ("coupon", "lattice_compression"):
         columns = _strained(columns, fields, kind, path, remarks)
         _check_strain(columns["strain"], table.rows, kind, path, remarks)
@@ -143,14 +117,13 @@ def _experiment(entry: dict[str, Any], at: _Place) -> tuple[Experiment, list[Rem
     return experiment, remarks
 
 
-def _gauge_pressure(pressure_kPa: Array, entry: dict[str, Any], at: _Place) -> Array:
+def _gauge_pressure(pressure_kPa: Array, entry: TomlTable) -> Array:
     """Gauge pressure (n,) in kPa: as read, or less the atmosphere if it is marked as absolute."""
-    if "pressure" in entry and _choice(entry, "pressure", PRESSURES, at) == "absolute":
-        return pressure_kPa - ATMOSPHERE_kPa
-    return pressure_kPa
+    absolute = entry.word("pressure", PRESSURES, "gauge") == "absolute"
+    return pressure_kPa - ATMOSPHERE_kPa if absolute else pressure_kPa
 
 
-def _require_gauge_pressures(experiments: Sequence[Experiment], entries: Sequence[dict[str, Any]]) -> None:
+def _require_gauge_pressures(experiments: Sequence[Experiment], entries: Sequence[TomlTable]) -> None:
     """Raise InputError if all readings look like a unit's absolute pressures and are not marked."""
     read = [e for e in experiments if "pressure_kPa" in e.columns]
     if not read or any("pressure" in entry for entry in entries):
@@ -167,105 +140,67 @@ def _require_gauge_pressures(experiments: Sequence[Experiment], entries: Sequenc
         )
 
 
-def _described(entry: dict[str, Any], kind: Kind, at: _Place) -> dict[str, Any]:
+# Bounds of the keys that are numbers; those above zero.
+_BETWEEN = {
+    "scale": (0.01, 100.0),
+    "orientation_deg": (-360.0, 360.0),
+    "run_order": (-1e15, 1e15),
+    "temperature_C": (-100.0, 300.0),
+    "gap_mm": (0.0, 1e3),
+    "added_mass_g": (0.0, 1e6),
+}
+_UP_TO = {"length_mm": 1e4, "strut_mm": 1e3, "mass_g": 1e6, "mass_sd_g": 1e6, "chamber_volume_mm3": 1e9}
+_CHOICES = {"mode": MODES, "plates": PLATES, "valve": VALVES, "axis": AXES}
+
+
+def _described(entry: TomlTable, kind: Kind) -> dict[str, Any]:
     """Checked values of the keys that are present."""
-    fields: dict[str, Any] = {
-        "name": _word(entry, "name", at),
-        "role": _choice(entry, "role", ROLES, at),
-        "specimen": _word(entry, "specimen", at) if "specimen" in entry else "",
-        "session": _word(entry, "session", at) if "session" in entry else "",
-        "source": _word(entry, "source", at) if "source" in entry else "",
-        "scale": _number(entry.get("scale", 1.0), "scale", at, 0.01, 100.0),
-        "orientation_deg": _number(entry.get("orientation_deg", 0.0), "orientation_deg", at, -360.0, 360.0),
-        "temperature_C": math.nan,
-    }
-    if "run_order" in entry:
-        fields["run_order"] = _number(entry["run_order"], "run_order", at, -1e15, 1e15)
-    if "temperature_C" in entry:
-        fields["temperature_C"] = _number(entry["temperature_C"], "temperature_C", at, -100.0, 300.0)
-    for key, most in (
-        ("length_mm", 1e4),
-        ("strut_mm", 1e3),
-        ("mass_g", 1e6),
-        ("mass_sd_g", 1e6),
-        ("chamber_volume_mm3", 1e9),
-    ):
-        if key in entry:
-            fields[key] = _number(entry[key], key, at, 0.0, most, above=True)
-    if "strut_mm" in entry and "cells" not in entry:
-        raise InputError(
-            "strut_mm needs cells", at("strut_mm"), "give the count of cells, from which a block is computed"
-        )
+    fields: dict[str, Any] = {"name": entry.word("name"), "role": entry.word("role", ROLES)}
+    fields |= {key: entry.word(key) for key in ("specimen", "session", "source") if key in entry}
+    fields |= {key: entry.number(key, *bounds) for key, bounds in _BETWEEN.items() if key in entry}
+    above = {key: entry.number(key, 0.0, most, above=True) for key, most in _UP_TO.items() if key in entry}
+    fields |= above | {key: entry.word(key, names) for key, names in _CHOICES.items() if key in entry}
     fields["accuracy"] = {
-        column: _number(entry[key], key, at, 0.0, 1e6, above=True)
-        for key, column in ACCURACIES.items()
-        if key in entry
+        column: entry.number(key, 0.0, 1e6, above=True) for key, column in ACCURACIES.items() if key in entry
     }
-    if "gap_mm" in entry:
-        fields["gap_mm"] = _number(entry["gap_mm"], "gap_mm", at, 0.0, 1e3)
+    if "strut_mm" in entry and "cells" not in entry:
+        remedy = "give the count of cells, from which a block is computed"
+        raise InputError("strut_mm needs cells", entry.at("strut_mm"), remedy)
     if "orientation_axis" in entry:
-        fields["orientation_axis"] = _axis(entry["orientation_axis"], at)
+        fields["orientation_axis"] = _axis(entry)
     if kind.name == "unit_pose" and "orientation_deg" in entry:
         raise InputError(
             "orientation_deg is a column of unit_pose, one value a row",
-            at("orientation_deg"),
+            entry.at("orientation_deg"),
             f"leave the key out of {FILE}",
         )
-    if "added_mass_g" in entry:
-        fields["added_mass_g"] = _number(entry["added_mass_g"], "added_mass_g", at, 0.0, 1e6)
-    if "mode" in entry:
-        fields["mode"] = _choice(entry, "mode", MODES, at)
-    for key, choices in (("plates", PLATES), ("valve", VALVES)):
-        if key in entry:
-            fields[key] = _choice(entry, key, choices, at)
-    if "axis" in entry:
-        fields["axis"] = _choice(entry, "axis", AXES, at)
     if "section_mm" in entry:
-        pair = entry["section_mm"]
-        if not isinstance(pair, list) or len(pair) != 2:
-            raise InputError(
-                f"section_mm = {pair!r} is not a pair", at("section_mm"), "give width and thickness, [w, t]"
-            )
-        fields["section_mm"] = tuple(_number(v, "section_mm", at, 0.0, 1e4, above=True) for v in pair)
+        pair = entry.take("section_mm", tuple[float, float])
+        fields["section_mm"] = tuple(entry.bounded("section_mm", v, 0.0, 1e4, above=True) for v in pair)
     for key, size in (("force_accuracy_N", "section_mm"), ("displacement_accuracy_mm", "length_mm")):
         if key in entry and size in kind.keys and size not in entry:
-            raise InputError(
-                f"{key} needs {size}", at(key), f"give {size}, which turns it into one of stress or strain"
-            )
+            remedy = f"give {size}, which turns it into one of stress or strain"
+            raise InputError(f"{key} needs {size}", entry.at(key), remedy)
     if "cells" in entry:
-        fields["cells"] = _cells(entry["cells"], at)
+        alone = type(entry.values["cells"]) is int
+        cells = entry.take("cells", int if alone else tuple[int, int, int])
+        fields["cells"] = (cells,) * 3 if alone else cells
+        for count in fields["cells"]:
+            entry.bounded("cells", count, 1, 1000)
     return fields
 
 
-def _axis(value: Any, at: _Place) -> tuple[float, float, float]:
+def _axis(entry: TomlTable) -> tuple[float, float, float]:
     """A direction of length 1, of "x", "y", "z" or three numbers."""
-    if isinstance(value, str) and value in AXES:
-        return tuple(float(a == value) for a in AXES)  # type: ignore[return-value]
-    if not isinstance(value, list) or len(value) != 3:
-        raise InputError(
-            f"orientation_axis = {value!r} is not a direction",
-            at("orientation_axis"),
-            'give "x", "y", "z" or three numbers, [x, y, z]',
-        )
-    x, y, z = (_number(v, "orientation_axis", at, -1e6, 1e6) for v in value)
+    key = "orientation_axis"
+    if entry.values[key] in AXES:
+        return tuple(float(a == entry.values[key]) for a in AXES)  # type: ignore[return-value]
+    x, y, z = entry.take(key, tuple[float, float, float])
     length = math.hypot(x, y, z)
-    if not length > 0.0:
-        raise InputError(
-            "orientation_axis has no length", at("orientation_axis"), "give three numbers, not all of them 0"
-        )
+    if not 0.0 < length < math.inf:
+        remedy = 'give "x", "y", "z" or three numbers, not all of them 0'
+        raise InputError(f"{key} has no length", entry.at(key), remedy)
     return x / length, y / length, z / length
-
-
-def _cells(value: Any, at: _Place) -> tuple[int, int, int]:
-    cells = value if isinstance(value, list) else [value] * 3
-    whole = all(isinstance(c, int) and not isinstance(c, bool) and 1 <= c <= 1000 for c in cells)
-    if len(cells) != 3 or not whole:
-        raise InputError(
-            f"cells = {value!r} is not a number of cells",
-            at("cells"),
-            "give one whole number, or three along x, y, z",
-        )
-    return cells[0], cells[1], cells[2]
 
 
 def _strained(
@@ -365,80 +300,31 @@ def _check_spread(spread: Array, column: str, rows: Array, path: Path) -> None:
     )
 
 
-def _check_apart(found: Experiment, before: Sequence[Experiment], at: _Place) -> None:
+def _check_apart(found: Experiment, before: Sequence[Experiment], entry: TomlTable) -> None:
     """Check that names differ and that no held-out data were fitted."""
     for other in before:
         if other.name == found.name:
             raise InputError(
-                f"two experiments are named {found.name!r}", at("name"), "give them different names"
+                f"two experiments are named {found.name!r}", entry.at("name"), "give them different names"
             )
         if other.sha256 == found.sha256 and other.role != found.role:
             raise InputError(
                 f"{found.name!r} and {other.name!r} contain the same data, and one of them is held out",
-                at("file"),
+                entry.at("file"),
                 "hold out data that no fit uses",
             )
 
 
-def _file(name: str, at: _Place) -> Path:
+def _file(entry: TomlTable, folder: Path) -> Path:
+    name = entry.word("file")
     path = Path(name)
     if path.is_absolute() or ".." in path.parts:
         raise InputError(
             f"file {name!r} lies outside the folder",
-            at("file"),
+            entry.at("file"),
             "keep a folder's files in it, so that it can be moved",
         )
-    return at.path.parent / path
-
-
-def _text(path: Path, remedy: str, read: Callable[[Path], str] = file_text) -> str:
-    try:
-        return read(path)
-    except UnicodeDecodeError as error:
-        raise InputError("the file is not UTF-8 text", str(path), "save it as UTF-8") from error
-    except OSError as error:
-        raise InputError(f"cannot read {path.name}: {error.strerror}", str(path), remedy) from error
-
-
-def _word(entry: dict[str, Any], key: str, at: _Place) -> str:
-    value = entry[key]
-    if not isinstance(value, str) or not value.strip():
-        raise InputError(f"{key} = {value!r} is not a name", at(key), f'write {key} = "..."')
-    return value
-
-
-def _choice(entry: dict[str, Any], key: str, choices: tuple[str, ...], at: _Place) -> str:
-    if key not in entry:
-        raise InputError(f"key {key!r} is missing", at(), f"choose one of {', '.join(choices)}")
-    value = entry[key]
-    if value not in choices:
-        hint = did_you_mean(value, choices) if isinstance(value, str) else ""
-        raise InputError(
-            f"{key} = {value!r} is not known{hint}", at(key), f"choose one of {', '.join(choices)}"
-        )
-    return str(value)
-
-
-def _number(value: Any, key: str, at: _Place, low: float, high: float, above: bool = False) -> float:
-    if isinstance(value, bool) or not isinstance(value, int | float):
-        raise InputError(f"{key} = {value!r} is not a number", at(key), "give a number without its unit")
-    if not low <= value <= high or (above and value == low):
-        range_ = f"above {low:g}, up to {high:g}" if above else f"from {low:g} to {high:g}"
-        raise InputError(f"{key} = {value:g} is out of bounds", at(key), f"give a number {range_}")
-    return float(value)
-
-
-def _place(path: Path, text: str, number: int, key: str = "") -> str:
-    """File and line of a key of the n-th experiment, or of the line that begins it."""
-    count = 0
-    for line, words in enumerate(text.splitlines(), 1):
-        if re.match(r"\s*\[\[", words):
-            count += 1
-            if count == number and not key:
-                return f"{path}, line {line}"
-        elif count == number and key and re.match(rf"\s*[\"']?{re.escape(key)}[\"']?\s*=", words):
-            return f"{path}, line {line}"
-    return str(path)
+    return folder / path
 
 
 def experiments_digest(measured: Measured) -> str:

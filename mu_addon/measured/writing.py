@@ -6,15 +6,18 @@ import csv
 import io
 import re
 import tempfile
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
+from functools import partial
 from pathlib import Path
 from typing import Any
 
+import attrs
 import numpy as np
 
 from ..errors import InputError
 from ..files import write_text
 from ..reading import file_text
+from ..run.parts import File
 from .folder import FILE, read_folder
 from .table import Remark
 
@@ -36,52 +39,59 @@ def csv_text(columns: Mapping[str, Array], shown: Callable[[float], str] = "{:.1
     return stream.getvalue()
 
 
-def tried(block: str, file: str, text: str) -> tuple[Remark, ...]:
-    """Remarks of the reader of measured data on an experiment before it is written anywhere.
+@attrs.frozen
+class Entry:
+    """An experiment to be put into a folder: its [[experiment]] in TOML, its CSV file's name and content."""
 
-    block: its [[experiment]] in TOML; file, text: its CSV file's name and content. Raises InputError.
-    """
-    with tempfile.TemporaryDirectory() as scratch:
-        write_text(Path(scratch) / FILE, block)
-        write_text(Path(scratch) / file, text)
-        try:
-            measured = read_folder(Path(scratch))
-        except InputError as error:
-            where = error.where.replace(scratch, "").lstrip("/\\")
-            raise InputError(error.what, where, error.remedy) from error
-    return tuple(Remark(r.what, Path(r.where.replace(scratch, "")).name, r.remedy) for r in measured.remarks)
+    name: str
+    block: str
+    file: str
+    text: str
 
-
-def require_free(folder: Path, name: str, block: str, file: str) -> None:
-    """Raise InputError where another experiment of the folder has this name or this file."""
-    listed = folder / FILE
-    if not listed.exists() or block in file_text(listed):
-        return
-    same = [e for e in read_folder(folder).experiments if e.name == name or e.file.name == file]
-    if same:
-        raise InputError(
-            f"an experiment named {same[0].name!r}, in {same[0].file.name}, already exists",
-            str(listed),
-            "rename this experiment, or remove the other one",
+    def tried(self) -> tuple[Remark, ...]:
+        """Remarks of the reader of measured data, before anything is written; raises its InputError."""
+        with tempfile.TemporaryDirectory() as scratch:
+            write_text(Path(scratch) / FILE, self.block)
+            write_text(Path(scratch) / self.file, self.text)
+            try:
+                measured = read_folder(Path(scratch))
+            except InputError as error:
+                where = error.where.replace(scratch, "").lstrip("/\\")
+                raise InputError(error.what, where, error.remedy) from error
+        return tuple(
+            Remark(r.what, Path(r.where.replace(scratch, "")).name, r.remedy) for r in measured.remarks
         )
 
+    def require_free(self, folder: Path) -> None:
+        """Raise InputError where another experiment of the folder has this name or this file."""
+        listed = folder / FILE
+        if not listed.exists() or self.block in file_text(listed):
+            return
+        same = [e for e in read_folder(folder).experiments if self.name == e.name or self.file == e.file.name]
+        if same:
+            raise InputError(
+                f"an experiment named {same[0].name!r}, in {same[0].file.name}, already exists",
+                str(listed),
+                "rename this experiment, or remove the other one",
+            )
 
-def add_experiment(folder: Path, name: str, block: str, file: str, text: str) -> tuple[Remark, ...]:
-    """Put an experiment into a folder; return the reader's remarks.
 
-    One with the same entry is replaced. Arguments as of `tried`. Raises InputError where another holds the
-    name or the file, or the data could not be read again, and OutputError.
+def added(entries: Sequence[Entry]) -> list[File]:
+    """Parts that put experiments into a run's folder of measured data, beside those that it has.
+
+    One with the same entry is replaced. Writing raises InputError where another holds a name or a file.
     """
-    remarks = tried(block, file, text)
-    require_free(folder, name, block, file)
-    put(folder, block, file, text)
-    return remarks
 
+    def table(path: Path, entry: Entry) -> str:
+        # Before the first of them is written.
+        for one in entries if entry is entries[0] else ():
+            one.require_free(path.parent)
+        return entry.text
 
-def put(folder: Path, block: str, file: str, text: str) -> None:
-    """Write a checked experiment whose name and file are free into a folder; raises OutputError."""
-    listed = folder / FILE
-    before = file_text(listed) if listed.exists() else ""
-    write_text(folder / file, text)
-    if block not in before:
-        write_text(listed, f"{before.rstrip()}\n\n{block}".lstrip())
+    def listed(path: Path) -> str:
+        text = file_text(path) if path.exists() else ""
+        for entry in entries:
+            text = text if entry.block in text else f"{text.rstrip()}\n\n{entry.block}".lstrip()
+        return text
+
+    return [*(File(one.file, partial(table, entry=one)) for one in entries), File(FILE, listed)]

@@ -15,6 +15,7 @@ from ..design.parameters import SECTIONS, Unit
 from ..design.quantity import Description, describe
 from ..errors import InputError, did_you_mean
 from ..meshing.settings import OF_CONTINUUM, require_printed
+from ..toml_reader import TomlTable
 
 SCALE = "scale"
 PATH, RESIN = "path", "resin"
@@ -179,19 +180,19 @@ def changed_unit(unit: Unit, freedoms: Sequence[Freedom], values: Sequence[Any])
     return attrs.evolve(unit, **head, **changed)
 
 
-def read_freedoms(tables: Sequence[Mapping[str, Any]], where: Sequence[str], unit: Unit) -> list[Freedom]:
-    """The freedoms of [[freedom]] tables; those that are fixed only change `fixed_unit`.
+def read_freedoms(tables: Sequence[TomlTable], unit: Unit) -> list[Freedom]:
+    """The freedoms of [[freedom]] tables; those that are fixed only change the unit (`fixed_values`).
 
-    where: file and line of each. Raises InputError that names key and line.
+    Raises InputError that names key and line.
     """
     found: list[Freedom] = []
-    for table, place in zip(tables, where, strict=True):
-        freedom = _freedom(table, place)
+    for table in tables:
+        freedom = _freedom(table)
         if freedom is None:
             continue
         if freedom.name in {f.name for f in found}:
-            raise InputError(f"{freedom.name} is listed twice", place, "leave one of the two out")
-        _require_start(freedom, unit, place)
+            raise InputError(f"{freedom.name} is listed twice", table.at(), "leave one of the two out")
+        _require_start(freedom, unit, table)
         found.append(freedom)
     if not found:
         raise InputError(
@@ -202,135 +203,99 @@ def read_freedoms(tables: Sequence[Mapping[str, Any]], where: Sequence[str], uni
     return found
 
 
-def fixed_values(tables: Sequence[Mapping[str, Any]], where: Sequence[str]) -> dict[str, Any]:
+def fixed_values(tables: Sequence[TomlTable]) -> dict[str, Any]:
     """Values by name of the [[freedom]] tables with `fixed`; raises InputError for an unknown name."""
-    found = {}
-    for table, place in zip(tables, where, strict=True):
-        if "fixed" in table:
-            name, _ = _parameter(table, place)
-            _require_keys(table, ("parameter", "fixed"), place)
-            found[name] = table["fixed"]
-    return found
+    fixed = [table.only(("parameter", "fixed")) for table in tables if "fixed" in table]
+    return {_parameter(table)[0]: table.values["fixed"] for table in fixed}
 
 
-def _parameter(table: Mapping[str, Any], where: str) -> tuple[str, Description]:
-    known = parameters()
-    name = table.get("parameter")
-    require_printed(name, f"{where}, parameter")
+def _parameter(table: TomlTable) -> tuple[str, Description]:
+    known, name = parameters(), table.values.get("parameter")
+    require_printed(name, table.at("parameter"))
     if not isinstance(name, str) or name not in known:
         hint = did_you_mean(name, list(known)) if isinstance(name, str) else ""
         raise InputError(
             f"parameter = {name!r} is not a parameter of a unit{hint}",
-            f"{where}, parameter",
+            table.at("parameter"),
             "name it as in a unit's file: chambers.wall_mm, lattice.kind, scale; or path, resin",
         )
     return name, known[name]
 
 
-def _require_keys(table: Mapping[str, Any], known: Sequence[str], where: str) -> None:
-    for key in table:
-        if key not in known:
-            raise InputError(
-                f"unknown key {key!r}{did_you_mean(key, known)}",
-                f"{where}, {key}",
-                f"known: {', '.join(known)}",
-            )
-
-
-def _freedom(table: Mapping[str, Any], where: str) -> Freedom | None:
-    if table.get("parameter") in (PATH, RESIN):
-        return _choice(table, where)
-    name, d = _parameter(table, where)
+def _freedom(table: TomlTable) -> Freedom | None:
+    if table.values.get("parameter") in (PATH, RESIN):
+        name = table.only(("parameter", "values")).word("parameter")
+        return Freedom(name, values=_values(table, tuple[str, ...]))
+    name, d = _parameter(table)
     if "fixed" in table:
         return None
     for listed in FACTOR_LISTS:
         if name == listed.name and listed.key in table:
-            return _of_factor(listed, table, where)
-    _require_keys(table, ("parameter", "low", "high", "values", "also"), where)
-    also = _also(table.get("also", {}), where)
+            return _of_factor(listed, table)
+    also = _also(table.only(("parameter", "low", "high", "values", "also")))
     if "values" in table:
-        values = table["values"]
-        if "low" in table or "high" in table or not isinstance(values, list) or not values:
-            raise InputError(
-                f"{name} has both bounds and values, or an empty list", f"{where}, values",
-                "write values = [..] alone, or low and high",
-            )  # fmt: skip
-        return Freedom(name, values=tuple(dict.fromkeys(values)), also=also, unit=d.unit)
-    low, high = table.get("low"), table.get("high")
-    for key, value in (("low", low), ("high", high)):
-        if isinstance(value, bool) or not isinstance(value, int | float) or not math.isfinite(value):
-            raise InputError(
-                f"{key} = {value!r} of {name} is not a number",
-                f"{where}, {key}",
-                "write low = .. and high = ..",
-            )
-    assert isinstance(low, int | float)
-    assert isinstance(high, int | float)
+        if "low" in table or "high" in table:
+            what = f"{name} has both bounds and values"
+            raise InputError(what, table.at("values"), "write values = [..] alone, or low and high")
+        return Freedom(name, values=_values(table, tuple[Any, ...]), also=also, unit=d.unit)
+    low, high = table.take("low", float), table.take("high", float)
     if d.type not in (float, int):
-        raise InputError(f"{name} has no range", f"{where}, low", f"write values = [..] of {d.allowed}")
+        raise InputError(f"{name} has no range", table.at("low"), f"write values = [..] of {d.allowed}")
     if not d.low <= low < high <= d.high:
         raise InputError(
             f"low = {low:g} and high = {high:g} of {name} are not a range within its bounds",
-            f"{where}, low",
+            table.at("low"),
             f"choose from {d.low:g} to {d.high:g} {d.unit}".rstrip(),
         )
     if d.type is int:
         if low != int(low) or high != int(high):
-            raise InputError(f"{name} is a whole number", f"{where}, low", "give whole numbers")
+            raise InputError(f"{name} is a whole number", table.at("low"), "give whole numbers")
         return Freedom(name, values=tuple(range(int(low), int(high) + 1)), also=also, unit=d.unit)
-    return Freedom(name, float(low), float(high), also=also, unit=d.unit)
+    return Freedom(name, low, high, also=also, unit=d.unit)
 
 
-def _choice(table: Mapping[str, Any], where: str) -> Freedom:
-    """The freedom of a path or a resin; raises InputError where its values are not names."""
-    name = str(table["parameter"])
-    _require_keys(table, ("parameter", "values"), where)
-    values = table.get("values")
-    if not isinstance(values, list) or not values or not all(isinstance(v, str) for v in values):
-        example = '["alpha4", "alpha7"]' if name == PATH else '["elastic-50a-v1", "my-resin.toml"]'
-        raise InputError(f"{name} has no list of names", f"{where}, values", f"write values = {example}")
-    return Freedom(name, values=tuple(dict.fromkeys(values)))
+def _values(table: TomlTable, hint: Any) -> tuple[Any, ...]:
+    """The values of a discrete freedom, each once."""
+    values = table.take("values", hint)
+    if not values:
+        raise InputError("the list of values is empty", table.at("values"), "give what it may be")
+    return tuple(dict.fromkeys(values))
 
 
-def _of_factor(listed: FactorList, table: Mapping[str, Any], where: str) -> Freedom:
+def _of_factor(listed: FactorList, table: TomlTable) -> Freedom:
     """The factor at the place that a table names; raises InputError."""
-    _require_keys(table, ("parameter", listed.key, "low", "high"), where)
-    given, low, high = (table.get(key) for key in (listed.key, "low", "high"))
-    place = str(given) if isinstance(given, str | int) and not isinstance(given, bool) else "?"
+    given = table.only(("parameter", listed.key, "low", "high")).values[listed.key]
+    place = str(given) if type(given) in (str, int) and ";" not in str(given) else "?"
     what, example = listed.place
     try:
-        place = listed.canonical(place if ";" not in place else "?")
+        place = listed.canonical(place)
     except InputError as error:
         raise InputError(
             f"{listed.key} = {given!r} does not give {what}",
-            f"{where}, {listed.key}",
+            table.at(listed.key),
             f'write {listed.key} = "{example}"',
         ) from error
-    good = all(isinstance(v, int | float) and not isinstance(v, bool) for v in (low, high))
-    if not good or not listed.low <= low < high <= listed.high:  # type: ignore[operator]
+    low, high = table.take("low", float), table.take("high", float)
+    if not listed.low <= low < high <= listed.high:
         raise InputError(
             f"low = {low!r} and high = {high!r} of {listed.key} {place} are not a range of factors",
-            f"{where}, low",
+            table.at("low"),
             f"choose from {listed.low:g} to {listed.high:g}",
         )
-    return Freedom(f"{listed.name}[{place}]", float(low), float(high))  # type: ignore[arg-type]
+    return Freedom(f"{listed.name}[{place}]", low, high)
 
 
-def _also(given: Any, where: str) -> dict[str, float]:
+def _also(table: TomlTable) -> dict[str, float]:
     known = parameters()
-    if not isinstance(given, dict):
-        raise InputError(f"also = {given!r} is not a table", f"{where}, also", 'write { "a.b" = 2.0 }')
-    for name, factor in given.items():
-        if name not in known or isinstance(factor, bool) or not isinstance(factor, int | float):
-            raise InputError(
-                f"also: {name} = {factor!r} is not a parameter and a factor",
-                f"{where}, also",
-                'write { "chambers.bladder_diameter_mm" = 2.0 }',
-            )
-    return {name: float(factor) for name, factor in given.items()}
+    found: dict[str, float] = table.take("also", dict[str, float], {})
+    for name in found:
+        if name not in known:
+            what = f"also: {name} is not a parameter{did_you_mean(name, known)}"
+            raise InputError(what, table.at("also"), 'write { "chambers.bladder_diameter_mm" = 2.0 }')
+    return found
 
 
-def _require_start(freedom: Freedom, unit: Unit, where: str) -> None:
+def _require_start(freedom: Freedom, unit: Unit, table: TomlTable) -> None:
     """Raise InputError for a value that the parameter may not have."""
     if not freedom.is_of_unit:
         return
@@ -338,7 +303,7 @@ def _require_start(freedom: Freedom, unit: Unit, where: str) -> None:
         try:
             changed_unit(unit, [freedom], [freedom.low])
         except InputError as error:
-            raise InputError(error.what, f"{where}, {entry[0].key}", error.remedy) from error
+            raise InputError(error.what, table.at(entry[0].key), error.remedy) from error
         return
     d = parameters()[freedom.name]
     for value in freedom.values:
@@ -347,6 +312,6 @@ def _require_start(freedom: Freedom, unit: Unit, where: str) -> None:
         if not (fits and within):
             raise InputError(
                 f"{value!r} is not a value of {freedom.name}",
-                f"{where}, values",
+                table.at("values"),
                 f"choose {d.allowed or 'true or false'}",
             )

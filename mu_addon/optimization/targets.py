@@ -9,8 +9,9 @@ from typing import Any, Literal
 import attrs
 
 from ..design.body import Body
-from ..errors import InputError, did_you_mean
+from ..errors import InputError
 from ..reading import is_finite
+from ..toml_reader import TomlTable
 from .quantities import (
     AirVolume,
     Angle,
@@ -129,21 +130,18 @@ class Supplies:
     body: Body | None = None
 
 
-def read_targets(
-    tables: Sequence[Mapping[str, Any]], where: Sequence[str], supplies: Supplies
-) -> list[Target]:
-    """The targets of [[target]] tables; where: file and line of each.
+def read_targets(tables: Sequence[TomlTable], supplies: Supplies) -> list[Target]:
+    """The targets of [[target]] tables.
 
     A curve of points is a target a point. `printable` adds the printer's least wall as a bound for the
     search. Raises InputError that names key and line.
     """
     found: list[Target] = []
-    for table, place in zip(tables, where, strict=True):
-        for target in _targets(table, place, supplies):
+    for table in tables:
+        for target in _targets(table, supplies):
             if target.name in {t.name for t in found}:
-                raise InputError(
-                    f"two targets are named {target.name!r}", f"{place}, name", "give one of them a name"
-                )
+                what = f"two targets are named {target.name!r}"
+                raise InputError(what, table.at("name"), "give one of them a name")
             found.append(target)
     found += [_of_printer(t, supplies) for t in found if t.kind == "printable"]
     if not any(t.kind not in ("printable", "wall_thickness") for t in found):
@@ -163,30 +161,19 @@ def _of_printer(printable: Target, supplies: Supplies) -> Target:
     )  # fmt: skip
 
 
-def _targets(table: Mapping[str, Any], where: str, supplies: Supplies) -> list[Target]:
-    kind = table.get("kind")
-    if not isinstance(kind, str) or kind not in KINDS:
-        hint = did_you_mean(kind, list(KINDS)) if isinstance(kind, str) else ""
-        raise InputError(
-            f"kind = {kind!r} is not known{hint}", f"{where}, kind", f"one of: {', '.join(KINDS)}"
-        )
-    known = (*_FORM, *KINDS[kind][0])
-    for key in table:
-        if key not in known:
-            raise InputError(
-                f"unknown key {key!r} of {kind}{did_you_mean(key, known)}", f"{where}, {key}",
-                f"known: {', '.join(known)}",
-            )  # fmt: skip
+def _targets(table: TomlTable, supplies: Supplies) -> list[Target]:
+    kind = table.word("kind", tuple(KINDS))
+    table.only((*_FORM, *KINDS[kind][0]))
     if "points" in table:
-        return _curve(table, where, supplies)
-    name = table.get("name", _name(kind, table))
-    if not isinstance(name, str) or not name.strip() or len(name) > 60 or not name.isprintable():
-        raise InputError(f"name = {name!r} is not a name", f"{where}, name", "write a short text in quotes")
-    quantity = _quantity(kind, name, table, where, supplies)
+        return _curve(table, kind, supplies)
+    name = table.word("name", default=_name(kind, table.values))
+    if len(name) > 60 or not name.isprintable():
+        raise InputError(f"name = {name!r} is not a name", table.at("name"), "write a short text in quotes")
+    quantity = _quantity(kind, name, table, supplies)
     if kind in ("walls_apart", "printable"):
-        _refuse(table, ("value", "tolerance", "low", "high", "objective"), where, f"{kind} is a yes or a no")
-        return [Target(name, kind, "", quantity, tolerance=1.0, low=1.0, line=where)]
-    return [Target(name, kind, KINDS[kind][1], quantity, **_asked(table, where, kind), line=where)]
+        _refuse(table, ("value", "tolerance", "low", "high", "objective"), f"{kind} is a yes or a no")
+        return [Target(name, kind, "", quantity, tolerance=1.0, low=1.0, line=table.at())]
+    return [Target(name, kind, KINDS[kind][1], quantity, **_asked(table, kind), line=table.at())]
 
 
 def _name(kind: str, table: Mapping[str, Any]) -> str:
@@ -203,62 +190,52 @@ def _name(kind: str, table: Mapping[str, Any]) -> str:
     return f"{words} along {table['direction']}" if "direction" in table else words
 
 
-def _asked(table: Mapping[str, Any], where: str, kind: str) -> dict[str, Any]:
-    goal = table.get("objective")
+def _asked(table: TomlTable, kind: str) -> dict[str, Any]:
+    goal = table.word("objective", ("minimise", "maximise"), None)
     has_bound = "low" in table or "high" in table
     if ("value" in table) + has_bound + (goal is not None) != 1:
         raise InputError(
-            f"{kind} must have either value and tolerance, or low and high, or objective", where,
+            f"{kind} must have either value and tolerance, or low and high, or objective", table.at(),
             'write value = 40, tolerance = 1; or low = 40; or objective = "minimise"',
         )  # fmt: skip
     if goal is not None:
-        if goal not in ("minimise", "maximise"):
-            raise InputError(
-                f"objective = {goal!r} is not known", f"{where}, objective", '"minimise" or "maximise"'
-            )
-        _refuse(table, ("tolerance",), where, "an objective has no tolerance")
+        _refuse(table, ("tolerance",), "an objective has no tolerance")
         return {"goal": goal}
     if "value" in table:
         if "tolerance" not in table:
-            raise InputError("a value has no tolerance", f"{where}, tolerance", "write tolerance = ..")
-        found = {key: _number(table, key, where) for key in ("value", "tolerance")}
+            raise InputError("a value has no tolerance", table.at("tolerance"), "write tolerance = ..")
+        found = {key: _number(table, key) for key in ("value", "tolerance")}
     else:
-        found = {key: _number(table, key, where) for key in ("low", "high") if key in table}
+        found = {key: _number(table, key) for key in ("low", "high") if key in table}
         if found.get("low", -math.inf) >= found.get("high", math.inf):
-            raise InputError("low is not below high", f"{where}, low", "exchange the two")
+            raise InputError("low is not below high", table.at("low"), "exchange the two")
         largest = max(abs(v) for v in found.values())
-        found["tolerance"] = (
-            _number(table, "tolerance", where) if "tolerance" in table else NARROW * (largest or 1.0)
-        )
+        found["tolerance"] = _number(table, "tolerance", NARROW * (largest or 1.0))
     if found["tolerance"] <= 0:
-        raise InputError(
-            f"tolerance = {found['tolerance']:g} is not positive", f"{where}, tolerance", "give more than 0"
-        )
+        what = f"tolerance = {found['tolerance']:g} is not positive"
+        raise InputError(what, table.at("tolerance"), "give more than 0")
     return found
 
 
-def _curve(table: Mapping[str, Any], where: str, supplies: Supplies) -> list[Target]:
+def _curve(table: TomlTable, kind: str, supplies: Supplies) -> list[Target]:
     """A target at every point (pressure in kPa, value) of a curve."""
-    points = table["points"]
-    good = isinstance(points, list) and len(points) >= 2
-    if not good or not all(isinstance(p, list) and len(p) == 2 and all(map(is_finite, p)) for p in points):
-        raise InputError(
-            f"points = {points!r} is not a curve", f"{where}, points", "write [[-15, -20], [30, 40]]"
-        )
-    if "pressure_kPa" not in KINDS[table["kind"]][0]:
-        raise InputError(f"{table['kind']} has no curve", f"{where}, points", "give a value")
-    _refuse(table, ("value", "low", "high", "objective", "pressure_kPa"), where, "points give it already")
-    rest = {key: v for key, v in table.items() if key not in ("points", "name")}
+    points = table.take("points", tuple[tuple[float, float], ...])
+    if len(points) < 2:
+        raise InputError("one point is no curve", table.at("points"), "write [[-15, -20], [30, 40]]")
+    if "pressure_kPa" not in KINDS[kind][0]:
+        raise InputError(f"{kind} has no curve", table.at("points"), "give a value")
+    _refuse(table, ("value", "low", "high", "objective", "pressure_kPa"), "points give it already")
+    rest = {key: v for key, v in table.values.items() if key not in ("points", "name")}
     return [
         target
         for pressure, value in points
-        for target in _targets({**rest, "pressure_kPa": pressure, "value": value}, where, supplies)
+        for target in _targets(
+            attrs.evolve(table, values={**rest, "pressure_kPa": pressure, "value": value}), supplies
+        )
     ]
 
 
-def _quantity(
-    kind: str, name: str, table: Mapping[str, Any], where: str, supplies: Supplies
-) -> Quantity | None:
+def _quantity(kind: str, name: str, table: TomlTable, supplies: Supplies) -> Quantity | None:
     if kind == "printable":
         return None
     if kind == "mass":
@@ -268,98 +245,74 @@ def _quantity(
     if kind == "wall_thickness":
         return WallThickness(name)
     if kind == "stiffness":
-        direction = table.get("direction")
-        if direction not in ("x", "y", "z"):
-            raise InputError(
-                f"direction = {direction!r} is not an axis", f"{where}, direction", 'write "x", "y" or "z"'
-            )
-        return RestStiffness(name, direction)
+        return RestStiffness(name, table.word("direction", ("x", "y", "z")))
     if kind == "workspace":
-        return Workspace(name, _pressures(table, where))
+        return Workspace(name, _pressures(table))
     if kind in ("deviation", "sensor_slope"):
-        pressures, path = _pressures(table, where), table.get("path")
+        pressures, path = _pressures(table), table.values.get("path")
         if path is None and supplies.path_is_free:
             path = ""
         elif path not in supplies.paths:
             raise InputError(
-                f"path = {path!r} is not a path of the unit", f"{where}, path",
+                f"path = {path!r} is not a path of the unit", table.at("path"),
                 f"one of: {', '.join(supplies.paths)}; left out where the path is a freedom",
             )  # fmt: skip
         made = Disturbance if kind == "deviation" else SensorSlope
         return made(name, str(path), pressures)
-    pressure = 0.0 if kind == "air_volume" and "pressure_kPa" not in table else _pressure(table, where)
+    pressure = 0.0 if kind == "air_volume" and "pressure_kPa" not in table else _pressure(table)
     if kind == "air_volume":
         return AirVolume(name, pressure)
     if pressure == 0 and not (supplies.has_gravity and kind in ("angle", "tip_position")):
         raise InputError(
-            f"{kind} at 0 kPa is that of the unit at rest", f"{where}, pressure_kPa",
+            f"{kind} at 0 kPa is that of the unit at rest", table.at("pressure_kPa"),
             "give another; with orientation_deg, under its weight, an angle or a tip position may be at 0",
         )  # fmt: skip
     if kind == "angle":
         return Angle(name, pressure)
     if kind == "tip_force":
-        return _tip_force(name, pressure, table, where)
+        return _tip_force(name, pressure, table)
     if kind == "tip_position":
-        direction = table.get("direction", "y")
+        direction = table.values.get("direction", "y")
         if direction not in ("y", "z"):
             raise InputError(
-                f"the tip does not move in direction = {direction!r}", f"{where}, direction",
+                f"the tip does not move in direction = {direction!r}", table.at("direction"),
                 'write "y", toward which it bends, or "z", along the axis',
             )  # fmt: skip
         return TipPosition(name, pressure, str(direction))
     if kind == "walls_apart":
         return WallsApart(name, pressure)
-    region = table.get("region", "wall")
-    if region not in ("wall", "struts"):
-        raise InputError(f"region = {region!r} is not known", f"{where}, region", 'write "wall" or "struts"')
+    region = table.word("region", ("wall", "struts"), "wall")
     return Stretch(name, pressure, region, supplies.elongation if kind == "safety" else None)
 
 
-def _tip_force(name: str, pressure: float, table: Mapping[str, Any], where: str) -> TipForce:
-    gap = _number(table, "gap_mm", where) if "gap_mm" in table else 0.0
+def _tip_force(name: str, pressure: float, table: TomlTable) -> TipForce:
+    gap = table.number("gap_mm", 0.0, FARTHEST_WALL_MM, 0.0)
     if pressure < 0:
         raise InputError(
-            "the wall is on the side toward which pressure bends the unit", f"{where}, pressure_kPa",
+            "the wall is on the side toward which pressure bends the unit", table.at("pressure_kPa"),
             "give a pressure above 0",
         )  # fmt: skip
-    if not 0 <= gap <= FARTHEST_WALL_MM:
-        raise InputError(
-            f"gap_mm = {gap:g} is out of bounds", f"{where}, gap_mm", f"give 0 to {FARTHEST_WALL_MM:g} mm"
-        )
     return TipForce(name, pressure, gap)
 
 
-def _refuse(table: Mapping[str, Any], keys: Sequence[str], where: str, why: str) -> None:
+def _refuse(table: TomlTable, keys: Sequence[str], why: str) -> None:
     for key in keys:
         if key in table:
-            raise InputError(f"{why}: {key} does not apply there", f"{where}, {key}", "leave it out")
+            raise InputError(f"{why}: {key} does not apply there", table.at(key), "leave it out")
 
 
-def _pressures(table: Mapping[str, Any], where: str) -> tuple[float, ...]:
-    given = table.get("pressures_kPa")
-    if not isinstance(given, list) or not given or not all(is_finite(p) for p in given):
-        raise InputError(
-            f"pressures_kPa = {given!r} is not a list of pressures", f"{where}, pressures_kPa",
-            "write pressures_kPa = [-15, 30]",
-        )  # fmt: skip
-    found = tuple(sorted({_pressure({"pressure_kPa": p}, where) for p in given} - {0.0}))
+def _pressures(table: TomlTable) -> tuple[float, ...]:
+    given = table.take("pressures_kPa", tuple[float, ...])
+    bounded = (table.bounded("pressures_kPa", p, -HIGHEST_kPa, HIGHEST_kPa) for p in given)
+    found = tuple(sorted({*bounded} - {0.0}))
     if not found:
-        raise InputError("no pressure differs from 0", f"{where}, pressures_kPa", "give one")
+        raise InputError("no pressure differs from 0", table.at("pressures_kPa"), "give one")
     return found
 
 
-def _pressure(table: Mapping[str, Any], where: str) -> float:
-    found = _number(table, "pressure_kPa", where)
-    if abs(found) > HIGHEST_kPa:
-        raise InputError(
-            f"pressure_kPa = {found:g} is out of bounds", f"{where}, pressure_kPa",
-            f"give {-HIGHEST_kPa:g} to {HIGHEST_kPa:g} kPa",
-        )  # fmt: skip
-    return found
+def _pressure(table: TomlTable) -> float:
+    return float(table.number("pressure_kPa", -HIGHEST_kPa, HIGHEST_kPa))
 
 
-def _number(table: Mapping[str, Any], key: str, where: str) -> float:
-    value = table.get(key)
-    if not is_finite(value):
-        raise InputError(f"{key} = {value!r} is not a number", f"{where}, {key}", f"write {key} = ..")
-    return float(value)  # type: ignore[arg-type]
+def _number(table: TomlTable, key: str, default: Any = attrs.NOTHING) -> float:
+    return float(table.number(key, default=default))

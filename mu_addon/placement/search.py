@@ -93,9 +93,7 @@ def search_paths(
             return found
 
 
-def searching(
-    predicted_mm: Array, settings: SearchSettings | None = None
-) -> Generator[Array, Array, Search]:
+def searching(predicted_mm: Array, settings: SearchSettings | None = None) -> Generator[Array, Array, Search]:
     """Yield numbers (k,) of paths to solve, get their exact J_hat (k,) in mm, and return the search.
 
     predicted_mm (n,): positive predictions of J_hat. Raises InputError where a prediction is not positive or

@@ -21,10 +21,13 @@ _ALWAYS = {"summary.json": "all results of this run as numbers", "log.ndjson": "
 
 def write_page(work: Execution, stopped: str = "") -> None:
     """Draw the pictures and write report.html; stopped: why an incomplete run stopped."""
+    if work.study.joins and not any(parts for _, parts in work.shown):
+        return
     with work.context.progress.stage("report"):
+        work.open()
         versions = package_versions()
         work.context.summary["versions"] = versions
-        write_text(work.folder / "report.html", page_of(work, versions, stopped))
+        write_text(work.folder / work.study.page, page_of(work, versions, stopped))
 
 
 def page_of(work: Execution, versions: Mapping[str, str], stopped: str = "") -> str:
@@ -33,14 +36,14 @@ def page_of(work: Execution, versions: Mapping[str, str], stopped: str = "") -> 
     lead = ""
     titles: dict[str, str] = {}
     found: dict[str, str] = {}
-    for number, (one, parts) in enumerate(work.shown):
+    for shown, (one, parts) in enumerate(work.shown):
         html = _html(work, parts)
         if not one.title:
             lead += html
         else:
             titles[one.key] = one.title
             found[one.key] = found.get(one.key, "") + html
-        work.context.progress.update((number + 1) / (len(work.shown) + 1))
+        work.context.progress.update((shown + 1) / (len(work.shown) + 1))
     sections = [
         *((key, titles[key], html) for key, html in found.items()),
         ("time", "Computing time of each stage", _time(seconds) if seconds else ""),

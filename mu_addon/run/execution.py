@@ -34,13 +34,15 @@ class Execution:
     """A study at work in a folder; `run` it once.
 
     lines: sentences for the end of a command; fault: an error that is the result; shown: the sections with
-    their parts, as far as results are there.
+    their parts, as far as results are there. opening: called before the first file of a study that joins a
+    folder (`Study.joins`).
     """
 
     def __init__(self, study: Study, folder: Path, context: RunContext) -> None:
         self.study, self.folder, self.context = study.complete(), folder, context
         self.study.require_possible()
         self.results = Results(self.study, folder, context.progress)
+        self.opening: Callable[[], object] | None = None
         self.lines: list[str] = []
         self.fault: MuError | None = None
         self.shown: list[tuple[Section, list[Part]]] = []
@@ -394,11 +396,18 @@ class Execution:
         found.complete = len(found) == len(self.results.members.get(name, []))
         return found or None
 
+    def open(self) -> None:
+        """Begin to use the folder, if it is one that the study joins."""
+        opening, self.opening = self.opening, None
+        if opening is not None:
+            opening()
+
     def _write(self, file: File) -> None:
         of = "" if file.of is None else content(file.of)
         if of and self._written.get(file.name) == of:
             return
         made = file.make(self.folder / file.name)
+        self.open()
         of = of or digest(made or "")
         if made is not None and self._written.get(file.name) != of:
             write_bytes(self.folder / file.name, made.encode() if isinstance(made, str) else made)

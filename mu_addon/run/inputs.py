@@ -3,22 +3,17 @@
 from __future__ import annotations
 
 import hashlib
-import types
-import typing
 from collections.abc import Mapping
 from pathlib import Path
-from typing import Any, TypeVar, Union
+from typing import Any
 
 import attrs
 
-from ..errors import InputError, did_you_mean
-from ..reading import file_text, parse_toml
+from ..errors import InputError
+from ..toml_reader import TomlTable, read_toml
 from .folder import RUN
 
 FORMAT = 1
-# Far more than any file of inputs has.
-_LONGEST = 1_000_000
-Made = TypeVar("Made")
 
 
 def digest(content: str | bytes) -> str:
@@ -26,95 +21,20 @@ def digest(content: str | bytes) -> str:
     return hashlib.sha256(content.encode() if isinstance(content, str) else content).hexdigest()
 
 
-def read_toml(path: Path, what: str = "inputs", remedy: str = "choose another folder") -> dict[str, Any]:
-    """The document of a TOML file; raises InputError."""
-    where = str(path)
-    try:
-        text = file_text(path, _LONGEST)
-    except OSError as error:
-        raise InputError(f"cannot read the {what}: {error.strerror or error}", where, remedy) from error
-    except UnicodeDecodeError as error:
-        raise InputError("the file is not UTF-8 text", where, "save it as UTF-8") from error
-    return parse_toml(text, where)
+def read_inputs(
+    path: Path, what: str = "inputs", remedy: str = "choose another folder", version: int = FORMAT
+) -> tuple[TomlTable, dict[str, Any]]:
+    """Inputs of a file, and its table `[run]` of keys that decide no result. Raises InputError.
 
-
-def read_inputs(path: Path, *words: str, version: int = FORMAT) -> tuple[dict[str, Any], dict[str, Any]]:
-    """Content of a file of inputs, and its table `[run]` of keys that decide no result. Raises InputError.
-
-    A file without `format`, as older versions wrote some, is of format 1. words: as those of `read_toml`;
-    version: the format's number.
+    what, remedy: of a file that cannot be read; version: the format's number.
     """
-    document = read_toml(path, *words)
-    found = document.pop("format", FORMAT)
-    if found != version or isinstance(found, bool):
-        newer = isinstance(found, int) and not isinstance(found, bool) and found > version
-        raise InputError(
-            f"{path.name} is of format {found!r}, and this version reads {version}",
-            str(path),
-            "use the newer version that wrote it" if newer else "start it again in another folder",
-        )
-    run = document.pop(RUN, {})
-    if not isinstance(run, dict):
-        raise InputError(f"{RUN} is not a table", str(path), f"write it as [{RUN}]")
-    return document, run
-
-
-def structured(kind: type[Made], table: Any, where: str, **given: Any) -> Made:
-    """An instance of an attrs class from a table of TOML, each value of the type of its field.
-
-    given: values in addition to those of the table. Tables become classes, arrays become tuples, and integers
-    become floats where the class has a float. Raises InputError that names the key.
-    """
-    if not isinstance(table, Mapping):
-        raise InputError(f"{table!r} is not a table", where, "write it as a table")
-    hints = typing.get_type_hints(kind)
-    names = [field.name for field in attrs.fields(kind) if field.init and field.name not in given]  # type: ignore[arg-type]
-    for key in table:
-        if key not in names:
-            raise InputError(
-                f"unknown key {key!r}{did_you_mean(key, names)}", where, f"known: {', '.join(names)}"
-            )
-    values = {key: _value(hints[key], value, f"{where}, {key}") for key, value in table.items()}
-    try:
-        return kind(**values, **given)
-    except InputError as error:
-        raise InputError(error.what, f"{where}, {error.where}", error.remedy) from error
-    except (TypeError, ValueError) as error:
-        raise InputError(f"a value is not offered: {error.args[0]}", where, "correct that key") from error
-
-
-def _value(hint: Any, value: Any, where: str) -> Any:
-    """A value of TOML converted to the type of a field."""
-    origin, inner = typing.get_origin(hint), typing.get_args(hint)
-    if origin in (Union, types.UnionType):
-        (hint,) = [option for option in inner if option is not type(None)]
-        return _value(hint, value, where)
-    if origin is tuple and isinstance(value, list):
-        each = [inner[0]] * len(value) if inner[-1] is Ellipsis else list(inner)
-        if len(each) == len(value):
-            return tuple(
-                _value(h, v, f"{where}[{i}]") for i, (h, v) in enumerate(zip(each, value, strict=True))
-            )
-    if origin is typing.Literal and value in inner:
-        return value
-    if attrs.has(hint):
-        return structured(hint, value, where)
-    if hint is float and isinstance(value, int) and not isinstance(value, bool):
-        return float(value)
-    if hint in (float, int, str, bool) and type(value) is hint:
-        return value
-    if origin is tuple:
-        hint = tuple
-    words: dict[Any, str] = {
-        tuple: "a list",
-        float: "a number",
-        int: "a whole number",
-        str: "text in quotes",
-        bool: "true or false",
-    }
-    raise InputError(
-        f"{value!r} does not fit", where, f"give {words.get(hint, 'the value that a run writes there')}"
-    )
+    document = read_toml(path, what, remedy)
+    found = document.values.get("format")
+    newer = isinstance(found, int) and not isinstance(found, bool) and found > version
+    words = "use the newer version that wrote it" if newer else "start it again in another folder"
+    document.of_format(version, words)
+    keys = {key: value for key, value in document.values.items() if key not in ("format", RUN)}
+    return attrs.evolve(document, values=keys), dict(document.inner(RUN).values)
 
 
 def named_path(path: Path, run: Mapping[str, Any], key: str, what: str) -> Path:

@@ -99,7 +99,7 @@ class Chart:
 
 @attrs.frozen
 class Pictures:
-    """Pictures side by side, each also a file of the folder, if it has a name; make: name and picture of each.
+    """Pictures side by side, each also a file of the folder, if it has a name; make: name and picture.
 
     shown: False of files that no page shows. scale: of the pictures' colours, above them, of which `make` is
     called first.

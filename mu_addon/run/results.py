@@ -34,7 +34,9 @@ class Results:
         self.stages = study.all_stages()
         wanted = {name: one for name, one in self.stages.items() if one.wanted(study)}
         # What cannot do without a stage that is not wanted is not wanted either.
-        while without := [n for n, one in wanted.items() if any(self._lacks(one, p, wanted) for p in one.needs)]:
+        while without := [
+            n for n, one in wanted.items() if any(self._lacks(one, p, wanted) for p in one.needs)
+        ]:
             wanted = {name: one for name, one in wanted.items() if name not in without}
         self.members = {n: list(s.over.members(study)) if s.over else [None] for n, s in wanted.items()}
         self.failed: dict[Task, str] = {}
@@ -111,7 +113,8 @@ class Results:
 
     def _content(self, name: str) -> str:
         if name not in self._contents:
-            self._contents[name] = content(self.given(name))
+            # Nothing is kept in a folder that the study joins: no key outlives the run.
+            self._contents[name] = name if self.study.joins else content(self.given(name))
         return self._contents[name]
 
     def digest(self, task: Task) -> str | None:

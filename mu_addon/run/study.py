@@ -32,10 +32,11 @@ from typing import TYPE_CHECKING, Any, ClassVar, Self
 
 import attrs
 
-from ..errors import InputError, did_you_mean
+from ..errors import InputError
 from ..reading import file_bytes, parse_toml
+from ..toml_reader import TomlTable
 from .folder import RUN, FolderLayout
-from .inputs import FORMAT, digest, read_inputs, structured
+from .inputs import FORMAT, digest, read_inputs
 
 if TYPE_CHECKING:
     from .progress import Progress
@@ -66,9 +67,11 @@ class Input:
     descriptions: of the plain values that it is, or is made of (`design.quantity.Description`); none where
     faces ask for it in their own way. decides: False for one that decides no figure, such as a number of
     processes: it is in no key, and in the table [run] of the inputs' file. option: its name in a command, if
-    it is not that of the description; metavar: stands for its value there; many: it takes several words, or
-    so many; alone: its value where the option stands without one; path: "file" or "folder" if it names one;
-    group: title over its option in help; target: the first of a study's targets that has it.
+    it is not that of the description; argument: what stands for it where it is no option but a word in its
+    place; required: no command does without the option; repeated: the option may stand several times, and
+    the value is a list; metavar: stands for its value there; many: it takes several words, or so many;
+    alone: its value where the option stands without one; path: "file" or "folder" if it names one; group:
+    title over its option in help; target: the first of a study's targets that has it.
     An input of another kind overrides `made`, `write` and `read`.
     """
 
@@ -76,6 +79,9 @@ class Input:
     descriptions: tuple[Any, ...] = ()
     decides: bool = True
     option: str = ""
+    argument: str = ""
+    required: bool = False
+    repeated: bool = False
     metavar: str | tuple[str, ...] | None = None
     many: bool | int = False
     alone: str = ""
@@ -88,11 +94,15 @@ class Input:
         return values[0]
 
     def write(self, name: str, value: Any) -> Written:
-        """The value in the inputs' files."""
+        """The value in the inputs' files; an attrs class is a table."""
+        value = attrs.asdict(value) if attrs.has(type(value)) else value
         return Written({name: value}) if self.decides else Written(run={name: value})
 
     def read(self, name: str, found: Found) -> Any:
-        """The value, its keys taken out of what was found; raises InputError."""
+        """The value, its keys taken out of what was found; raises InputError.
+
+        Without a method of its own, the key is read as the type of the study's field.
+        """
         raise NotImplementedError
 
     def file_names(self, name: str) -> tuple[str, ...]:
@@ -141,16 +151,29 @@ class ReadInput(Input):
 class Found:
     """Inputs as they are found: their file, its keys, those of its table [run], the inputs read so far.
 
-    before: hashes of what was read from other files (`ReadInput`). replaced: names of inputs whose values
-    options of a command replace.
+    text: of the file. before: hashes of what was read from other files (`ReadInput`). replaced: names of
+    inputs whose values options of a command replace; target: whose table the keys are of.
     """
 
     path: Path
     keys: dict[str, Any]
     run: dict[str, Any]
+    text: str = ""
     given: dict[str, Any] = attrs.field(factory=dict)
     before: dict[str, Any] = attrs.field(factory=dict)
     replaced: tuple[str, ...] = ()
+    target: str = ""
+
+    @property
+    def table(self) -> TomlTable:
+        """Its keys, with their places."""
+        return TomlTable(self.keys, str(self.path), self.text, self.target)
+
+    def take(self, key: str, hint: Any, default: Any = attrs.NOTHING) -> Any:
+        """The value of a key as a type, taken out of the keys; raises InputError."""
+        found = self.table.take(key, hint, default)
+        self.keys.pop(key, None)
+        return found
 
 
 def setting(description: Any, **more: Any) -> Any:
@@ -352,7 +375,7 @@ def section(key: str = "", title: str = "", order: int = 0) -> Callable[[Any], A
     """A method that yields parts; its parameters name what it shows, None by default where it may lack.
 
     key, title: of the report's section; without, it leads. Sections of one key are one. order: sections of a
-    lower number come first, those of one as they are declared. It is called whenever one of them is new, so it
+    lower number come first, those of one as they are declared. It is called whenever one of them is new: it
     takes milliseconds.
     """
 
@@ -419,10 +442,12 @@ class Study:
     name: of its command; its inputs are in `name`.toml. from_file: of a command that reads such a file, and
     whose options replace values in it: help on the file, and what to do where it cannot be read. files:
     content of each file of the run's folder, by name or pattern; to_fill: files that are filled in by hand,
-    which no run removes. example: a command line. node: None of a study that is no node.
+    which no run removes. example: a command line. node: None of a study that is no node. joins: its folder
+    is one that several studies add to, such as one of measured data: it keeps no inputs and no results there,
+    is not resumed, and begins to use it with its first file. page: name of its report, "" without one.
 
-    commands: of a study of several, its targets, each with help and example by its name, in order of need. They
-    share a folder: each has the inputs and stages of those before it, and a table of its own in the file of
+    commands: of a study of several, its targets, each with help and example by its name, in order of need.
+    They share a folder: each has the inputs and stages of those before it, and a table of its own in the file of
     inputs; what a further one made stays valid. file: the name of that file, if it is not the study's;
     version: the number of its format; header: its first line.
     """
@@ -437,6 +462,8 @@ class Study:
     file: ClassVar[str] = ""
     version: ClassVar[int] = FORMAT
     header: ClassVar[str] = ""
+    joins: ClassVar[bool] = False
+    page: ClassVar[str] = "report.html"
 
     @property
     def wanted_targets(self) -> tuple[str, ...]:
@@ -488,7 +515,7 @@ class Study:
     def layout(cls) -> FolderLayout:
         """The files of its folder."""
         optional = tuple(file for name, one in cls.inputs().items() for file in one.file_names(name))
-        results = (*cls.files, "report.html")
+        results = (*cls.files, cls.page)
         header = cls.header or f"# Inputs of `{cls.name}`."
         return FolderLayout(f"{cls.file or cls.name}.toml", header, results, optional, cls.to_fill)
 
@@ -532,7 +559,9 @@ class Study:
     # Inputs as files.
 
     def texts(self) -> dict[str, str]:
-        """Text of every file of inputs, by name."""
+        """Text of every file of inputs, by name; none of a study that joins a folder."""
+        if self.joins:
+            return {}
         tables, run, files = self._written()
         return {self.layout().inputs: self._text(tables, run), **files}
 
@@ -577,44 +606,42 @@ class Study:
             return self.texts(), ()
         old, _, _ = self.read_tables(path)
         further = tuple(target for target in self.commands if target in old and target not in tables)
-        same = all(old[target] == tables[target] for target in tables if target in old)
+        same = all(old[target].values == tables[target] for target in tables if target in old)
         more = self._named_files(path, {target: old[target] for target in further}) if same else None
         if not further or more is None:
             return self.texts(), ()
-        merged = tables | {target: old[target] for target in further}
+        merged = tables | {target: dict(old[target].values) for target in further}
         run |= {TARGETS: list(tables)} if asked else {}
         return {self.layout().inputs: self._text(merged, run), **files, **more}, further
 
     @classmethod
     def read_tables(
         cls, path: Path, *words: str
-    ) -> tuple[dict[str, dict[str, Any]], dict[str, Any], tuple[str, ...]]:
-        """Keys of a file of inputs by target, its table [run], and the targets that it is run for.
+    ) -> tuple[dict[str, TomlTable], dict[str, Any], tuple[str, ...]]:
+        """Tables of a file of inputs by target, its table [run], and the targets that it is run for.
 
         words: as those of `read_inputs`. Raises InputError.
         """
-        keys, run = read_inputs(path, *words, version=cls.version)
+        document, run = read_inputs(path, *words, version=cls.version)
         if not cls.commands:
-            return {"": keys}, run, ("",)
-        known = [*cls.commands][: len(keys)]
-        if set(keys) != set(known) or not known:
+            return {"": document}, run, ("",)
+        known = [*cls.commands][: len(document.values)]
+        if set(document.values) != set(known) or not known:
             raise InputError(
-                f"the tables [{'], ['.join(map(str, keys))}] are not those of a {cls.file}",
-                str(path),
+                f"the tables [{'], ['.join(document.values)}] are not those of a {cls.file}",
+                document.at(),
                 f"the tables are [{'], ['.join(cls.commands)}], each with those before it",
             )
-        for target in known:
-            if not isinstance(keys[target], dict):
-                raise InputError(f"{target} is not a table", str(path), f"write it as [{target}]")
+        tables = {target: document.inner(target) for target in known}
         asked = run.pop(TARGETS, known)
-        return keys, run, tuple(target for target in known if target in asked)
+        return tables, run, tuple(target for target in known if target in asked)
 
     @classmethod
-    def _named_files(cls, path: Path, tables: Mapping[str, Mapping[str, Any]]) -> dict[str, str] | None:
+    def _named_files(cls, path: Path, tables: Mapping[str, TomlTable]) -> dict[str, str] | None:
         """Texts of the files that tables name, by name; None where one is not as it was."""
         found = {}
         for name, one in cls.inputs().items():
-            sha256 = tables.get(one.target, {}).get(f"{name}_sha256")
+            sha256 = tables[one.target].values.get(f"{name}_sha256") if one.target in tables else None
             for file in one.file_names(name) if sha256 else ():
                 try:
                     found[file] = file_bytes(path.parent / file).decode("utf-8")
@@ -646,55 +673,55 @@ class Study:
             )
         for name, value in replaced.items():
             one = cls.inputs()[name]
-            tables[one.target] |= parse_toml(toml_text(one.write(name, value).keys, ""), name)
+            more = parse_toml(toml_text(one.write(name, value).keys, ""), name)
+            tables[one.target] = attrs.evolve(
+                tables[one.target], values={**tables[one.target].values, **more}
+            )
         return cls.of_tables({target: tables[target] for target in targets}, path, run, tuple(replaced))
 
     @classmethod
     def of_tables(
         cls,
-        tables: Mapping[str, Mapping[str, Any]],
+        tables: Mapping[str, TomlTable],
         path: Path,
         run: Mapping[str, Any] = _NONE,
         replaced: tuple[str, ...] = (),
         **given: Any,
     ) -> Self:
-        """The study of the keys of a file of inputs by target; see `Found`, whose path this is.
+        """The study of the tables of a file of inputs by target; see `Found`, whose path this is.
 
         given: inputs in place of what tables say of them. Raises InputError.
         """
         made: dict[str, Any] = {"stages": tuple(tables)} | given if cls.commands else dict(given)
-        kept = dict(run)
+        known, kept = dict(made), dict(run)
         before: dict[str, Any] = {}
-        plain: dict[str, Any] = {}
+        hints = typing.get_type_hints(cls)
         for target, table in tables.items():
-            where = f"{path}, [{target}]" if target else str(path)
-            found = Found(path, dict(table), kept, made, before, replaced)
+            found = Found(path, dict(table.values), kept, table.text, known, before, replaced, target)
             for name, one in cls.inputs().items():
                 if one.target != target or name in given:
                     continue
-                if one.kind != "setting":
-                    made[name] = one.read(name, found)
+                if type(one).read is not Input.read:
+                    made[name] = known[name] = one.read(name, found)
                     continue
                 if not one.decides and name in kept:
                     found.keys[name] = kept[name]
+                known[name] = one.descriptions[0].default if one.descriptions else None
                 if name in found.keys:
-                    plain[name] = found.keys.pop(name)
-                made[name] = plain.get(name, one.descriptions[0].default)
-            left = {k: v for k, v in found.keys.items() if not (cls.commands and k.endswith("_sha256"))}
-            if cls.commands and left:
-                own = [n for n, one in cls.inputs().items() if one.target == target and one.decides]
-                unknown = next(iter(left))
-                raise InputError(
-                    f"unknown key {unknown!r}{did_you_mean(unknown, own)}",
-                    where,
-                    f"known: {', '.join(own)}",
-                )
-            plain |= left
-        settings = [name for name, one in cls.inputs().items() if one.kind == "setting"]
-        special = {name: value for name, value in made.items() if name in given or name not in settings}
-        study = structured(cls, plain, str(path), **special).complete()
+                    plain = one.kind == "setting"
+                    value = (
+                        found.table.setting(one.descriptions[0]) if plain else found.take(name, hints[name])
+                    )
+                    found.keys.pop(name, None)
+                    made[name] = known[name] = value
+            left = [k for k in found.keys if not (cls.commands and k.endswith("_sha256"))]
+            own = [n for n, one in cls.inputs().items() if one.target == target and one.decides]
+            attrs.evolve(found.table, values=dict.fromkeys(left)).only(own)
+        document = TomlTable({}, str(path), next((table.text for table in tables.values()), ""))
+        study = document.made(cls, **made).complete()
         for name in before:
-            study._read()[name].require(name, getattr(study, name), Found(path, {}, kept, {}, before))
+            there = Found(path, {}, kept, before=before)
+            study._read()[name].require(name, getattr(study, name), there)
         return study
 
     def complete(self) -> Self:

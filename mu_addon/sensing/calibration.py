@@ -24,7 +24,7 @@ from scipy.special import stdtrit
 
 from ..errors import InputError
 from ..files import write_text
-from ..reading import file_text, is_number, parse_toml, unreadable
+from ..toml_reader import read_toml
 from ..toml_writer import Commented, toml_text
 
 Array = np.ndarray[Any, Any]
@@ -380,36 +380,22 @@ def read_calibration(path: Path) -> Calibration:
     Raises InputError if it cannot be read, has another version, lacks a number, or has a map that is not
     monotonic.
     """
-    remedy = "give the calibration.toml that `calibrate` writes"
-    try:
-        table = parse_toml(file_text(path), str(path))
-    except (OSError, UnicodeDecodeError) as error:
-        raise InputError(f"cannot read the calibration: {unreadable(error)}", str(path), remedy) from None
-    except InputError as error:
-        raise InputError(f"cannot read the calibration: {error.what}", error.where, remedy) from None
-    try:
-        numbers = [*table["knots_deg"], *table["coefficients_V"]]
-        numbers += [table[n] for n in ("version", "band_V", "drift_per_h", "gain", "error_deg", "sweeps")]
-        if not all(map(is_number, [*numbers, 0 if isinstance(table["dark"], str) else table["dark"]])):
-            raise TypeError("true, false or text in place of numbers")
-        if table["version"] != VERSION:
-            raise InputError(f"version {table['version']} is not known", str(path), "calibrate again")
-        result = Calibration(
-            np.array(table["knots_deg"], float),
-            np.array(table["coefficients_V"], float),
-            float(table["band_V"]),
-            float(table["drift_per_h"]),
-            str(table["channel"]),
-            table["dark"] if isinstance(table["dark"], str) else float(table["dark"]),
-            float(table["gain"]),
-            float(table["error_deg"]),
-            int(table["sweeps"]),
-        )
-    except KeyError as error:
-        what = f"the calibration is invalid: it lacks {error.args[0]}"
-        raise InputError(what, str(path), "calibrate again") from None
-    except (TypeError, ValueError, OverflowError) as error:
-        raise InputError(f"the calibration is invalid: {error}", str(path), "calibrate again") from None
+    table = read_toml(path, "calibration", "give the calibration.toml that `calibrate` writes")
+    if table.take("version", int) != VERSION:
+        what = f"version {table.values['version']} is not known"
+        raise InputError(what, table.at("version"), "calibrate again")
+    dark: str | float = table.take("dark", str if isinstance(table.values.get("dark"), str) else float)
+    result = Calibration(
+        np.array(table.take("knots_deg", tuple[float, ...])),
+        np.array(table.take("coefficients_V", tuple[float, ...])),
+        table.take("band_V", float),
+        table.take("drift_per_h", float),
+        table.take("channel", str),
+        dark,
+        table.take("gain", float),
+        table.take("error_deg", float),
+        table.take("sweeps", int),
+    )
     steps = np.diff(result.coefficients)
     sound = (
         len(result.knots) == len(result.coefficients) + _DEGREE + 1 >= 2 * (_DEGREE + 1)

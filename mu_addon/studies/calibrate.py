@@ -11,7 +11,7 @@ from .. import sensing
 from ..run.parts import Chart, Fact, File, Part, Sentence, Table, csv, recorded
 from ..run.study import Node, ReadInput, Study, given, intermediate, section, setting, stage
 from ..sensing.settings import ANGLES, CHANNEL, DARK
-from .inputs import PlaceInput
+from .inputs import PlaceInput, asked
 
 
 @attrs.frozen(kw_only=True, eq=False)
@@ -38,7 +38,16 @@ class Calibrate(Study):
         },
     )
 
-    data: tuple[Path, ...] = given(PlaceInput(kind="bending", what="recording", many=True))
+    data: tuple[Path, ...] = asked(
+        PlaceInput,
+        "data",
+        "recordings, or folders of measured data of the kind waveguide_bending",
+        empty=attrs.NOTHING,
+        kind="bending",
+        what="recording",
+        argument="FOLDER",
+        many=True,
+    )
     channel: str = setting(CHANNEL, metavar="NAME")
     dark: str = setting(DARK, metavar="NAME|V")
     angles: Path | None = given(

@@ -14,7 +14,6 @@ from ..chain.settings import GRAVITY, ORIENTATION, REFINE, TIMES, TIP_MASS
 from ..design.quantity import described
 from ..design.settings import USUAL_RESIN
 from ..errors import InputError
-from ..run.inputs import structured
 from ..run.parts import Beside, Chart, Fact, File, Part, Pictures, Sentence, Table, Warn, csv, recorded
 from ..run.study import (
     Found,
@@ -31,7 +30,8 @@ from ..run.study import (
     setting,
     stage,
 )
-from .inputs import NumbersInput, TableInput
+from ..toml_reader import TomlTable
+from .inputs import NumbersInput
 
 JOINT_S = 289.0
 """Seconds in which a joint is learned at one pressure on the default mesh."""
@@ -98,31 +98,25 @@ class UnitsInput(Input):
 
     def read(self, name: str, found: Found) -> tuple[ChainUnit, ...]:
         """The units of the tables, of presets or of files beside; raises InputError."""
-        entries = found.keys.pop("unit", [])
-        if not isinstance(entries, list) or not all(isinstance(entry, dict) for entry in entries):
-            raise InputError(
-                "unit is not a list of tables", str(found.path), "write each unit as a table [[unit]]"
-            )
-        return tuple(_unit(entry, found.path, n) for n, entry in enumerate(entries, 1))
+        entries = found.table.tables("unit")
+        found.keys.pop("unit", None)
+        return tuple(_unit(entry, found.path.parent) for entry in entries)
 
     def file_names(self, name: str) -> tuple[str, ...]:
         """Files of as many units as there may be."""
         return tuple(f"unit_{n}.toml" for n in range(1, MOST_UNITS + 1))
 
 
-def _unit(entry: dict[str, Any], path: Path, number: int) -> ChainUnit:
-    where = f"{path}, [[unit]] {number}"
-    for key in entry:
-        if key not in _ENTRY:
-            raise InputError(f"unknown key {key!r}", where, f"known: {', '.join(_ENTRY)}")
+def _unit(entry: TomlTable, folder: Path) -> ChainUnit:
+    entry.only(_ENTRY)
     if ("preset" in entry) == ("file" in entry):
-        raise InputError("a unit is named by preset or by file", where, 'give preset = "mu-1.0x", or file')
-    named = entry.get("preset", entry.get("file"))
-    if not isinstance(named, str):
-        raise InputError(f"{named!r} is not a name", where, "give text in quotes")
-    unit = design.load_preset(named) if "preset" in entry else design.read_unit(path.parent / named)
-    rest = {key: entry[key] for key in ("turn_deg", "pressure_kPa") if key in entry}
-    return structured(ChainUnit, rest, where, unit=unit)
+        raise InputError(
+            "a unit is named by preset or by file", entry.at(), 'give preset = "mu-1.0x", or file'
+        )
+    named = entry.word("preset" if "preset" in entry else "file")
+    unit = design.load_preset(named) if "preset" in entry else design.read_unit(folder / named)
+    rest = {key: value for key, value in entry.values.items() if key not in ("preset", "file")}
+    return attrs.evolve(entry, values=rest).made(ChainUnit, unit=unit)
 
 
 @attrs.frozen
@@ -139,11 +133,9 @@ class PressuresInput(Input):
 
     def read(self, name: str, found: Found) -> chain.Pressures | None:
         """The pressures of the file, or None; raises InputError."""
-        named = found.keys.pop(name, None)
+        named = found.take(name, str, None)
         if named is None or "reach" in found.replaced:
             return None
-        if not isinstance(named, str):
-            raise InputError(f"protocol = {named!r}", str(found.path), "give the name of a CSV file")
         return chain.read_pressures(found.path.parent / named, len(found.given["units"]))
 
     def file_names(self, name: str) -> tuple[str, ...]:
@@ -161,11 +153,10 @@ class ReachInput(NumbersInput):
 
     def read(self, name: str, found: Found) -> tuple[float, ...]:
         """The point of the table; raises InputError."""
-        table = found.keys.pop("target", {})
-        if not isinstance(table, dict) or set(table) - {name}:
-            raise InputError(f"[target] has only {name}", f"{found.path}, [target]", f"write {name} alone")
-        found.keys.update(table)
-        return super().read(name, found)
+        table = found.table.inner("target").only((name,))
+        found.keys.pop("target", None)
+        point: tuple[float, ...] = table.take(name, tuple[float, ...], ())
+        return point
 
 
 def _finer(study: Chain) -> float:
@@ -213,8 +204,8 @@ class Chain(Study):
         described("resin", USUAL_RESIN, "resin of the library, for the units' weight"), metavar="NAME"
     )
     times: int = setting(TIMES, metavar="N")
-    mesh: MeshTable = given(TableInput(of=lambda: MeshTable), factory=MeshTable)
-    joint: chain.Sampling = given(TableInput(of=lambda: chain.Sampling), factory=lambda: chain.Sampling())
+    mesh: MeshTable = given(Input("table"), factory=MeshTable)
+    joint: chain.Sampling = given(Input("table"), factory=lambda: chain.Sampling())
 
     def __attrs_post_init__(self) -> None:
         if not 1 <= len(self.units) <= MOST_UNITS:

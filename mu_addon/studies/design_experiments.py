@@ -98,8 +98,14 @@ class DesignExperiments(Study):
 
     data: measured.Measured = given(
         MeasuredInput(
-            text="Folder of planned experiments, in the format of `diagnose`; the measured columns may hold "
-            "any numbers."
+            descriptions=(
+                described(
+                    "folder",
+                    "",
+                    "folder of planned experiments, in the format of `diagnose`; the measured columns may "
+                    "hold any numbers",
+                ),
+            )
         )
     )
     unit: design.Unit | None = given(

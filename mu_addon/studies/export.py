@@ -12,7 +12,7 @@ from .. import design, materials
 from ..design.settings import FINE, USUAL_RESIN
 from ..errors import InputError, MeshingError, OutputError, did_you_mean
 from ..files import json_text
-from ..run.inputs import digest, named_path, require_digest, structured
+from ..run.inputs import digest, named_path, require_digest
 from ..run.parts import Fact, File, Part, Sentence, Table, Warn, recorded
 from ..run.study import (
     Found,
@@ -90,8 +90,8 @@ class TakeOffInput(Input):
 
     def read(self, name: str, found: Found) -> TakeOff:
         """The offset of the file; raises InputError."""
-        numbers, source = found.keys.pop("take_off_mm", [0.0, 0.0]), found.keys.pop("offset_source", "")
-        return structured(TakeOff, {"xy_z": numbers, "source": source}, f"{found.path}, take_off_mm")
+        offset = found.take("take_off_mm", tuple[float, float], (0.0, 0.0))
+        return TakeOff(offset, found.take("offset_source", str, ""))
 
 
 @attrs.frozen

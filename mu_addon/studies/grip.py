@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from pathlib import Path
 from typing import Any
 
@@ -30,7 +30,7 @@ from ..run.study import (
     setting,
     stage,
 )
-from .inputs import UNIT, NumbersInput
+from .inputs import UNIT, FileInput, NumbersInput
 
 CUBES = described("cubes_mm", "12.5 25", "side lengths in mm of the cubes to grasp")
 COARSE = described("coarse", False, "quick, less accurate run: coarser mesh, longer time steps")
@@ -76,31 +76,22 @@ class GripperInput(Input):
 
 
 @attrs.frozen
-class PhasesInput(Input):
-    """Pressure over the phases of a grasp, in a file of its own."""
+class PhasesInput(FileInput):
+    """Pressure over the phases of a grasp, by default those that are shipped."""
 
     kind: str = "phases"
+    file: str = "{name}.csv"
+    text: Callable[[Any], str] = lambda phases: phases.text()
+    load: Callable[[Path], Any] = lambda path: grasp.read_phases(path)
 
     def made(self, values: tuple[Any, ...], given: Mapping[str, Any]) -> grasp.Phases:
         """The phases of a file, by default those that are shipped; raises InputError."""
-        return grasp.read_phases(Path(values[0])) if values[0] else grasp.shipped_phases()
-
-    def write(self, name: str, value: grasp.Phases) -> Written:
-        """Its file."""
-        return Written({name: f"{name}.csv"}, files={f"{name}.csv": value.text()})
-
-    def read(self, name: str, found: Found) -> grasp.Phases:
-        """The phases of the folder; raises InputError."""
-        found.keys.pop(name, None)
-        return grasp.read_phases(found.path.parent / f"{name}.csv")
+        found: grasp.Phases | None = super().made(values, given)
+        return grasp.shipped_phases() if found is None else found
 
     def same(self, value: grasp.Phases, other: grasp.Phases) -> bool:
         """Return True for equal pressures and phases."""
         return value.text() == other.text()
-
-    def file_names(self, name: str) -> tuple[str, ...]:
-        """Its file."""
-        return (f"{name}.csv",)
 
 
 @attrs.frozen

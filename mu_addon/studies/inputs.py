@@ -14,8 +14,8 @@ from .. import design, evidence, materials, measured
 from ..design.quantity import described, in_kPa, in_MPa
 from ..design.settings import USUAL_RESIN
 from ..errors import InputError
-from ..reading import file_text, unreadable
-from ..run.inputs import named_path, structured
+from ..reading import text_in
+from ..run.inputs import named_path
 from ..run.study import Found, Input, Written, given
 
 UNIT, MODEL = "unit.toml", "model.toml"
@@ -23,40 +23,58 @@ UNIT, MODEL = "unit.toml", "model.toml"
 _LONGEST_PATH = 1 << 18
 
 
-def asked(
-    kind: type[Input], name: str, text: str, default: str = "", *, empty: Any = None, **more: Any
-) -> Any:
+def asked(of: type[Input], name: str, text: str, default: str = "", *, empty: Any = None, **more: Any) -> Any:
     """attrs field of an input that is made of one text; empty: its value without it; more: of the input."""
-    return given(kind(descriptions=(described(name, default, text),), **more), default=empty)
+    return given(of(descriptions=(described(name, default, text),), **more), default=empty)
 
 
 @attrs.frozen
-class UnitInput(Input):
-    """A unit, in a file of its own; needed: there is always one; default: the preset where none is given.
+class FileInput(Input):
+    """A value in a file of its own beside the inputs; None is none.
+
+    file: its name, "{name}" in it for that of the input; text: of a value; load: the value of a file, raises
+    InputError; needed: there is always one.
+    """
+
+    kind: str = "file"
+    file: str = "{name}.toml"
+    text: Callable[[Any], str] = str
+    load: Callable[[Path], Any] = Path
+    needed: bool = True
+
+    def made(self, values: tuple[Any, ...], given: Mapping[str, Any]) -> Any:
+        """The value of the file that is named; raises InputError."""
+        return self.load(Path(values[0])) if values[0] else None
+
+    def write(self, name: str, value: Any) -> Written:
+        """The file's name, and its text."""
+        (file,) = self.file_names(name)
+        return Written() if value is None else Written({name: file}, files={file: self.text(value)})
+
+    def read(self, name: str, found: Found) -> Any:
+        """The value of the folder's file; raises InputError."""
+        if found.take(name, str, attrs.NOTHING if self.needed else None) is None:
+            return None
+        return self.load(found.path.parent / self.file_names(name)[0])
+
+    def file_names(self, name: str) -> tuple[str, ...]:
+        """Its file."""
+        return (self.file.format(name=name),)
+
+
+@attrs.frozen
+class UnitInput(FileInput):
+    """A unit; default: the preset where none is given.
 
     modelled: a command takes an extended model's parameters into it, and none of its other effects.
     """
 
     kind: str = "unit"
-    needed: bool = True
+    file: str = UNIT
+    text: Callable[[Any], str] = lambda unit: design.to_toml(unit)
+    load: Callable[[Path], Any] = lambda path: design.read_unit(path)
     default: str = ""
     modelled: bool = True
-
-    def write(self, name: str, value: design.Unit | None) -> Written:
-        """The file's name, and its text."""
-        if value is None:
-            return Written()
-        return Written({name: UNIT}, files={UNIT: design.to_toml(value)})
-
-    def read(self, name: str, found: Found) -> design.Unit | None:
-        """The unit of the folder; raises InputError."""
-        if found.keys.pop(name, None) is None and not self.needed:
-            return None
-        return design.read_unit(found.path.parent / UNIT)
-
-    def file_names(self, name: str) -> tuple[str, ...]:
-        """Its file."""
-        return (UNIT,)
 
     def same(self, value: design.Unit | None, other: design.Unit | None) -> bool:
         """Return True if they differ in name alone."""
@@ -75,28 +93,26 @@ class WordsInput(Input):
         (value,) = values
         return tuple(value.split() if isinstance(value, str) else value or ())
 
-    def read(self, name: str, found: Found) -> tuple[str, ...]:
-        """The words of the file; raises InputError."""
-        words = found.keys.pop(name, [])
-        if not isinstance(words, list) or not all(isinstance(word, str) for word in words):
-            raise InputError(
-                f"{words!r} does not fit", f"{found.path}, {name}", "give a list of texts in quotes"
-            )
-        return tuple(words)
-
 
 @attrs.frozen
 class MeasuredInput(Input):
     """A folder of measured data, read at its place.
 
-    data: what of it decides, by the experiments' names; text: says in a command what folder it is.
+    data: what of it decides, by the experiments' names.
     """
 
     kind: str = "measured"
+    descriptions: tuple[Any, ...] = (
+        described("folder", "", "folder of measured data: experiments.toml and its CSV files"),
+    )
+    argument: str = "FOLDER"
     data: Callable[[measured.Measured], dict[str, Any]] = lambda found: {
         e.name: e.hash() for e in found.experiments
     }
-    text: str = ""
+
+    def made(self, values: tuple[Any, ...], given: Mapping[str, Any]) -> measured.Measured:
+        """The folder's content; raises InputError."""
+        return measured.read_folder(Path(values[0]))
 
     def write(self, name: str, value: measured.Measured) -> Written:
         """Its place, and what decides."""
@@ -124,7 +140,9 @@ class PlaceInput(Input):
     needed: bool = True
 
     def made(self, values: tuple[Any, ...], given: Mapping[str, Any]) -> Any:
-        """The path of a text; None without."""
+        """The path of a text, or those of several; None without."""
+        if self.many:
+            return tuple(map(Path, values[0]))
         return Path(values[0]) if values[0] else None
 
     def write(self, name: str, value: Any) -> Written:
@@ -179,10 +197,11 @@ class ResinInput(Input):
 
     def read(self, name: str, found: Found) -> Resin:
         """The resin of its table; raises InputError."""
-        table = found.keys.pop(name, None)
-        if isinstance(table, dict) and isinstance(table.get("modulus_kPa"), int | float):
-            table["modulus_MPa"] = in_MPa(table.pop("modulus_kPa"))
-        return structured(Resin, table, f"{found.path}, [{name}]")
+        table = found.table.inner(name)
+        found.keys.pop(name, None)
+        modulus = in_MPa(table.take("modulus_kPa", float))
+        values = {key: value for key, value in table.values.items() if key != "modulus_kPa"}
+        return attrs.evolve(table, values=values).made(Resin, modulus_MPa=modulus)
 
 
 @attrs.frozen
@@ -269,9 +288,9 @@ class PathInput(Input):
 
     def read(self, name: str, found: Found) -> design.Window | NodePath | None:
         """The path of the file; raises InputError."""
-        of = {"name": found.keys.pop(name, ""), "points": found.keys.pop("points_mm", [])}
-        known = structured(NodePath, of, str(found.path))
-        return known if known.points else self.made((known.name,), found.given)
+        path = found.take(name, str, "")
+        points = found.take("points_mm", tuple[tuple[float, float, float], ...], ())
+        return NodePath(path, points) if points else self.made((path,), found.given)
 
 
 def path_of(unit: design.Unit, name: str, row: str = "") -> design.Window | NodePath | None:
@@ -284,12 +303,8 @@ def path_of(unit: design.Unit, name: str, row: str = "") -> design.Window | Node
         )
     if not name.endswith(".csv"):
         return design.window(unit, name) if name else None
-    try:
-        rows = csv.DictReader(io.StringIO(file_text(name)))
-    except (OSError, UnicodeDecodeError) as error:
-        raise InputError(
-            f"cannot read the paths: {unreadable(error)}", name, "give paths.csv of `place --paths graph`"
-        ) from error
+    text = text_in(name, "paths", "give paths.csv of `place --paths graph`")
+    rows = csv.DictReader(io.StringIO(text))
     named = next((r for r in rows if not row or r.get("path") == row), None)
     if named is None:
         raise InputError(
@@ -311,10 +326,12 @@ def _points(text: str) -> tuple[tuple[float, float, float], ...]:
 
 
 @attrs.frozen
-class PrinterInput(Input):
+class PrinterInput(FileInput):
     """A printer with its resin, and limits measured on it in place of the printer's; its values are kept."""
 
     kind: str = "printer"
+    text: Callable[[Any], str] = lambda printer: design.printer_text(printer)
+    load: Callable[[Path], Any] = lambda path: design.read_printer(path)
 
     def made(self, values: tuple[Any, ...], given: Mapping[str, Any]) -> design.Printer:
         """The printer of a name or a file, with the limits of a filled sheet; raises InputError."""
@@ -322,14 +339,6 @@ class PrinterInput(Input):
 
         printer, limits = design.load_printer(values[0]), given.get("limits")
         return printer.with_limits(measured_limits(Path(limits))) if limits else printer
-
-    def write(self, name: str, value: design.Printer) -> Written:
-        """Its file."""
-        return Written({name: f"{name}.toml"}, files={f"{name}.toml": design.printer_text(value)})
-
-    def read(self, name: str, found: Found) -> design.Printer:
-        """The printer of the folder; raises InputError."""
-        return design.read_printer(found.path.parent / str(found.keys.pop(name, "")))
 
 
 @attrs.frozen
@@ -345,22 +354,6 @@ class OnceInput(Input):
     def read(self, name: str, found: Found) -> Any:
         """The default."""
         return self.descriptions[0].default
-
-
-@attrs.frozen
-class TableInput(Input):
-    """Values in a table of their own; of: their attrs class, which is loaded when they are read."""
-
-    kind: str = "table"
-    of: Callable[[], type] = lambda: dict
-
-    def write(self, name: str, value: Any) -> Written:
-        """Its table."""
-        return Written({name: attrs.asdict(value)})
-
-    def read(self, name: str, found: Found) -> Any:
-        """The values of the table, the others by default; raises InputError."""
-        return structured(self.of(), found.keys.pop(name, {}), f"{found.path}, [{name}]")
 
 
 @attrs.frozen
@@ -384,32 +377,25 @@ class NumbersInput(Input):
         """The numbers, if there are any."""
         return Written({name: value} if value else {})
 
-    def read(self, name: str, found: Found) -> tuple[float, ...]:
-        """The numbers of the file; raises InputError."""
-        numbers = found.keys.pop(name, [])
-        if not isinstance(numbers, list) or not all(type(n) in (int, float) for n in numbers):
-            raise InputError(f"{numbers!r} does not fit", f"{found.path}, {name}", "give a list of numbers")
-        return tuple(map(float, numbers))
-
 
 @attrs.frozen
-class ModelInput(Input):
-    """An extended model of a diagnosis, in a file of its own, or None."""
+class ModelInput(FileInput):
+    """An extended model of a diagnosis, or None."""
 
     kind: str = "model"
-
-    def write(self, name: str, value: evidence.ExtendedModel | None) -> Written:
-        """The file's name, and its text."""
-        return Written() if value is None else Written({name: MODEL}, files={MODEL: value.text()})
-
-    def read(self, name: str, found: Found) -> evidence.ExtendedModel | None:
-        """The model of the folder, if it has one; raises InputError."""
-        named = found.keys.pop(name, None)
-        return None if named is None else evidence.load_model(found.path.parent / MODEL)
-
-    def file_names(self, name: str) -> tuple[str, ...]:
-        """Its file."""
-        return (MODEL,)
+    file: str = MODEL
+    text: Callable[[Any], str] = lambda model: model.text()
+    load: Callable[[Path], Any] = lambda path: evidence.load_model(path)
+    needed: bool = False
+    descriptions: tuple[Any, ...] = (
+        described(
+            "model",
+            "",
+            "extended model, the model.toml of `diagnose`: its identified effects are applied to the unit; "
+            "empty: none",
+        ),
+    )
+    metavar: str = "FILE"
 
 
 _SCHEDULER = described(

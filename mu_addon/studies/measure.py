@@ -16,7 +16,7 @@ from .. import measured, sensing
 from ..design.quantity import described
 from ..errors import InputError
 from ..run.inputs import digest
-from ..run.parts import Fact, File, Part, Sentence, Warn, recorded
+from ..run.parts import Fact, Part, Sentence, Warn, recorded
 from ..run.study import Node, ReadInput, Study, derived, given, section, setting, stage
 from ..toml_writer import toml_text
 from .inputs import PlaceInput
@@ -103,20 +103,17 @@ class Measure(Study):
         return Motion(columns)
 
     @derived
-    def table(self, experiment: str) -> str:
-        """Name of the experiment's CSV file."""
-        return f"{measured.file_stem(experiment)}.csv"
-
-    @derived
-    def block(self, experiment: str, table: str, specimen: str) -> str:
-        """The experiment as experiments.toml has it."""
-        keys = {"name": experiment, "kind": "unit_pressure", "file": table, "role": "fit"}
-        return "[[experiment]]\n" + toml_text({**keys, "specimen": specimen})
+    def entry(self, experiment: str, specimen: str, data: Motion) -> measured.Entry:
+        """The experiment, as the folder has it."""
+        file = f"{measured.file_stem(experiment)}.csv"
+        keys = {"name": experiment, "kind": "unit_pressure", "file": file, "role": "fit"}
+        block = "[[experiment]]\n" + toml_text({**keys, "specimen": specimen})
+        return measured.Entry(experiment, block, file, data.text())
 
     @stage("measure", 1.0, kept=False)
-    def remarks(self, block: str, table: str, data: Motion) -> tuple[measured.Remark, ...]:
+    def remarks(self, entry: measured.Entry) -> tuple[measured.Remark, ...]:
         """Remarks of the reader of measured data, before anything is written; raises its InputError."""
-        return measured.tried(block, table, data.text())
+        return entry.tried()
 
     def title(self) -> str:
         """The report's title."""
@@ -124,15 +121,14 @@ class Measure(Study):
 
     @section()
     def answer(
-        self, remarks: tuple[measured.Remark, ...], block: str, table: str, data: Motion
+        self, remarks: tuple[measured.Remark, ...], entry: measured.Entry, data: Motion
     ) -> Iterator[Part]:
         """The experiment, and the range of its readings."""
         import numpy as np
 
         for remark in remarks:
             yield Warn(remark.what, remark.where, remark.remedy, repeated=False)
-        yield File(table, lambda path: data.text())
-        yield File("experiments.toml", lambda path: block)
+        yield from measured.added([entry])
         kPa, angle = data.columns["pressure_kPa"], data.columns["angle_deg"]
         low, high = float(np.min(kPa)), float(np.max(kPa))
         least, most = float(np.nanmin(angle)), float(np.nanmax(angle))

@@ -5,12 +5,14 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from functools import partial
 from math import isnan
+from pathlib import Path
 from typing import Any, TypeAlias
 
 import attrs
 
 from .. import design as designs
 from .. import evidence, optimization
+from ..design.quantity import described
 from ..errors import InputError
 from ..optimization.settings import BODY, DESIGN, RESIN, UNIT, WORKERS
 from ..run.parts import Beside, Chart, Fact, File, Part, Sentence, Table, Warn, csv, recorded
@@ -75,7 +77,14 @@ class DesignInput(Input):
     """Targets and freedoms, in files of their own."""
 
     kind: str = "design"
-    text: str = "Targets and freedoms, a design.toml: see docs/guide/search.md."
+    descriptions: tuple[Any, ...] = (
+        described("file", "", "targets and freedoms, a design.toml: see docs/guide/search.md"),
+    )
+    argument: str = "FILE"
+
+    def made(self, values: tuple[Any, ...], given: Mapping[str, Any]) -> optimization.Design:
+        """The design of a file; raises InputError."""
+        return optimization.read_design(Path(values[0]))
 
     def write(self, name: str, value: optimization.Design) -> Written:
         """The file's name, and the texts of it and those beside it."""

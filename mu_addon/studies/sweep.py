@@ -53,14 +53,14 @@ class PlanInput(Input):
         from ..usecases.parameter_study.plan import counts_of, planned
 
         folder, keys = found.path.parent, {"protocol": str(found.path.parent / PROTOCOL)} | found.keys
+        table = found.table
         found.keys.clear()
         counts = counts_of(found.run.get("points", []), str(found.path))
         last = [stage for stage in STAGES if stage in keys][-1:]
         more = {"stages": last[0] if last else STAGES[0]} | ({"points": counts[-1]} if counts else {})
         files = Path(str(found.run.get("files", folder)))
-        return planned(
-            keys | more, lambda file: design.read_unit(folder / UNIT), files, str(found.path), counts
-        )
+        document = attrs.evolve(table, values=keys | more)
+        return planned(document, lambda file: design.read_unit(folder / UNIT), files, counts)
 
     def file_names(self, name: str) -> tuple[str, ...]:
         """Its files."""

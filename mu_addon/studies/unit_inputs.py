@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -13,11 +13,11 @@ from ..design.quantity import described
 from ..design.settings import FRICTION
 from ..errors import InputError
 from ..meshing.settings import REFINE
-from ..run.inputs import structured
 from ..run.study import Found, Input, Written
 from ..sensing.optics import Optics
 from ..usecases import simulate_and_place as core
 from ..usecases.simulate_and_place.settings import PROTOCOL
+from .inputs import FileInput
 
 BODY, PROTOCOL_FILE, OBSTACLES = "body.obj", "protocol.csv", "obstacles.obj"
 GRASP = "protocols/grasp.csv"
@@ -48,10 +48,13 @@ def protocol_text(protocol: fem.Protocol) -> str:
 
 
 @attrs.frozen
-class ProtocolInput(Input):
-    """A pressure protocol, in a file of its own."""
+class ProtocolInput(FileInput):
+    """A pressure protocol; without a file the default one."""
 
     kind: str = "protocol"
+    file: str = PROTOCOL_FILE
+    text: Callable[[Any], str] = protocol_text
+    load: Callable[[Path], Any] = lambda path: fem.read_protocol(path)
     descriptions: tuple[Any, ...] = (PROTOCOL,)
     metavar: str = "CSV"
     target: str = "simulate"
@@ -60,25 +63,16 @@ class ProtocolInput(Input):
         """The protocol of a file, or the default one; raises InputError."""
         return protocol_of(values[0])
 
-    def write(self, name: str, value: fem.Protocol) -> Written:
-        """The file's name, and its text."""
-        return Written({name: PROTOCOL_FILE}, files={PROTOCOL_FILE: protocol_text(value)})
-
-    def read(self, name: str, found: Found) -> fem.Protocol:
-        """The protocol of the folder; raises InputError."""
-        found.keys.pop(name, None)
-        return fem.read_protocol(found.path.parent / PROTOCOL_FILE)
-
-    def file_names(self, name: str) -> tuple[str, ...]:
-        """Its file."""
-        return (PROTOCOL_FILE,)
-
 
 @attrs.frozen
-class BodyInput(Input):
-    """A closed surface that replaces the lattice's box, cut to the unit's length, in a file of its own."""
+class BodyInput(FileInput):
+    """A closed surface that replaces the lattice's box, cut to the unit's length."""
 
     kind: str = "body"
+    file: str = BODY
+    text: Callable[[Any], str] = lambda body: body.text()
+    load: Callable[[Path], Any] = lambda path: design.read_body(path)
+    needed: bool = False
     descriptions: tuple[Any, ...] = (
         described(
             "body",
@@ -94,20 +88,7 @@ class BodyInput(Input):
         """The body of a file; raises InputError."""
         from ..design.body import envelope
 
-        return envelope(design.read_body(values[0]), given["unit"].dimensions) if values[0] else None
-
-    def write(self, name: str, value: design.Body | None) -> Written:
-        """The file's name, and its text."""
-        return Written() if value is None else Written({name: BODY}, files={BODY: value.text()})
-
-    def read(self, name: str, found: Found) -> design.Body | None:
-        """The body of the folder, if it has one; raises InputError."""
-        named = found.keys.pop(name, None)
-        return None if named is None else design.read_body(found.path.parent / BODY)
-
-    def file_names(self, name: str) -> tuple[str, ...]:
-        """Its file."""
-        return (BODY,)
+        return envelope(self.load(values[0]), given["unit"].dimensions) if values[0] else None
 
 
 @attrs.frozen
@@ -185,14 +166,6 @@ class MeshInput(Input):
         """Settings of a refinement."""
         return meshing.MeshSettings(refine=values[0])
 
-    def write(self, name: str, value: meshing.MeshSettings) -> Written:
-        """Their table."""
-        return Written({name: attrs.asdict(value)})
-
-    def read(self, name: str, found: Found) -> meshing.MeshSettings:
-        """The settings of the table; raises InputError."""
-        return structured(meshing.MeshSettings, found.keys.pop(name, {}), f"{found.path}, [simulate.mesh]")
-
 
 @attrs.frozen
 class OpticsInput(Input):
@@ -208,14 +181,6 @@ class OpticsInput(Input):
     def made(self, values: tuple[Any, ...], given: Mapping[str, Any]) -> Optics:
         """The assumed constants, changed by pairs; raises InputError."""
         return optics_of(values[0] or ())
-
-    def write(self, name: str, value: Optics) -> Written:
-        """Their table."""
-        return Written({name: attrs.asdict(value)})
-
-    def read(self, name: str, found: Found) -> Optics:
-        """The constants of the table; raises InputError."""
-        return structured(Optics, found.keys.pop(name, {}), f"{found.path}, [place.optics]")
 
 
 def optics_of(words: Sequence[str]) -> Optics:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from functools import cache
+from functools import cache, partial
 from pathlib import Path
 from typing import Any
 
@@ -28,9 +28,9 @@ def use_case(name: str) -> UseCase[Study]:
         kind.read,
         run,
         console_summary=lambda summary: [],
-        begin=begin_study,
-        plan=lambda study: [*study.expected().items(), ("report", study.report_s)],
+        plan=lambda study: [*study.expected().items(), *_report(study)],
         plan_in=plan,
+        begin=_join if kind.joins else begin_study,
     )
 
 
@@ -75,6 +75,11 @@ def _earlier(folder: Path) -> dict[str, Any]:
     return {name: value for name, value in found.items() if name not in ("status", "reason", "warnings")}
 
 
+def _join(job: Study, folder: Path, context: RunContext) -> None:
+    """Leave the folder as it is until the first file, and every run of its own."""
+    context.words = None
+
+
 def run(job: Study, folder: Path, context: RunContext) -> Execution:
     """Make every result of a study in its folder, and report those that there are.
 
@@ -83,8 +88,11 @@ def run(job: Study, folder: Path, context: RunContext) -> Execution:
     from ..report.study_page import write_page
 
     work: Execution = context.work or Execution(job, folder, context)
-    context.summary["versions"] = package_versions()
-    if not (work.study.texts_in(folder)[1] and (folder / "report.html").is_file()):
+    if job.joins:
+        work.opening = partial(context.open_folder, folder)
+    else:
+        context.summary["versions"] = package_versions()
+    if job.page and not (work.study.texts_in(folder)[1] and (folder / job.page).is_file()):
         context.report = lambda stopped: write_page(work, stopped)
     context.console_summary = lambda summary: work.lines
     work.run()
@@ -99,4 +107,8 @@ def run(job: Study, folder: Path, context: RunContext) -> Execution:
 def plan(job: Study, folder: Path, context: RunContext) -> Plan:
     """Stages with the seconds that are left of each."""
     context.work = Execution(job, folder, context)
-    return [*context.work.plan(), ("report", context.work.study.report_s)]
+    return [*context.work.plan(), *_report(context.work.study)]
+
+
+def _report(job: Study) -> Plan:
+    return [("report", job.report_s)] if job.page else []

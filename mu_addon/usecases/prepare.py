@@ -58,10 +58,9 @@ class Job:
 def read_job(folder: Path) -> Job:
     """The job that a folder describes; raises InputError."""
     path = folder / LAYOUT.inputs
-    values, _ = read_inputs(path)
-    what = values.pop("what", "")
-    if what not in MAKERS:
-        raise InputError(f"{what!r} cannot be prepared", str(path), f"one of {', '.join(MAKERS)}")
+    table, _ = read_inputs(path)
+    what = table.word("what", tuple(MAKERS))
+    values = {key: value for key, value in table.values.items() if key != "what"}
     unit, body = folder / UNIT, folder / BODY
     return Job(
         what, values, read_unit(unit) if unit.is_file() else None, read_body(body) if body.is_file() else None

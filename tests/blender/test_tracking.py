@@ -5,8 +5,8 @@ import json
 import numpy as np
 import pytest
 
+from mu_addon.lab_files.tracked_table import read_pixels
 from mu_addon.measured import read_folder
-from mu_addon.usecases.track_video.tracked_table import read_pixels
 from tests.headless.processes import assert_clear_failure, run
 
 from .filming import ANGLES, MM_PER_PIXEL, described, film, pressures

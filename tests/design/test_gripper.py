@@ -66,7 +66,7 @@ def test_a_gripper_survives_its_file(tmp_path):
 @pytest.mark.parametrize(
     ("old", "new", "words"),
     [
-        ('kind = "gripper"', 'kind = "hand"', "not a gripper of format 1"),
+        ('kind = "gripper"', 'kind = "hand"', "not a gripper"),
         ('unit = "mu-1.0x"', "", "unit is missing"),
         ('unit = "mu-1.0x"', 'unit = "mu-2.0x"', "no preset 'mu-2.0x'"),
         ('path = "alpha4"', 'path = "alpha11"', "no path 'alpha11'"),

@@ -135,7 +135,7 @@ def test_a_text_of_struts_is_the_kind_and_has_one_canonical_form():
         ('kind = "custom"\nstruts = "0 0 0 to 2 1 1"', 4, "a node outside its cell"),
         ('struts = "0 0 0 to 1 1 1"', 3, "no effect with another kind"),
         ('kind = "none.toml"', None, "cannot read the lattice kind"),
-        ('kind = "mine.toml"', None, "no struts"),
+        ('kind = "mine.toml"', None, "struts is missing"),
         ('kind = "mine.toml"\nstruts = "0 0 0 to 1 1 1"', 4, "no effect with another kind"),
         (f'kind = "custom"\nstruts = "{"0 0 0 to 1 1 1; " * 201}"', 4, "a cell of 201 struts"),
     ],

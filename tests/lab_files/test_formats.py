@@ -9,7 +9,7 @@ import pytest
 
 from mu_addon.lab_files import formats, source
 from mu_addon.lab_files.decisions import DECISIONS
-from mu_addon.usecases.import_data.understood import understand
+from mu_addon.lab_files.understood import understand
 
 DOCS = Path(__file__).resolve().parents[2] / "docs"
 

@@ -14,8 +14,8 @@ import pytest
 from mu_addon.errors import InputError
 from mu_addon.lab_files.blocks import tables
 from mu_addon.lab_files.source import read_sheets, sheet_of_text
-from mu_addon.usecases.import_data.report import terminal_lines
-from mu_addon.usecases.import_data.understood import understand
+from mu_addon.lab_files.understood import understand
+from mu_addon.studies.import_ import terminal_lines
 
 from .test_cells import workbook
 

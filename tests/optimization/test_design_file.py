@@ -76,10 +76,10 @@ def test_the_path_of_a_target_may_be_a_freedom():
     assert [t.quantity.path for t in chosen.targets[1:]] == ["alpha4", "alpha1"]
     assert found.unit_of(values).waveguide.row == 1
     assert read(found).start == found.start
-    for wrong, words in (('"alpha99"', "is not a path"), ("3", "no list of names")):
+    for wrong, words in (('"alpha99"', "is not a path"), ("3", "is not text in quotes")):
         with pytest.raises(InputError, match=words) as error:
             design(HEAD + ANGLE + WALL + path.replace('"alpha4"', wrong))
-        assert "line 13, values" in error.value.where
+        assert "line 13, [freedom] values" in error.value.where
     with pytest.raises(InputError, match="is not a path of the unit"):
         design(HEAD + ANGLE + slope + WALL)
 
@@ -170,7 +170,7 @@ def test_what_a_printed_body_does_not_have_is_no_freedom(name, instead, free):
     table = f'[[freedom]]\nparameter = "material.{name}"\n{free}\n'
     with pytest.raises(InputError, match=f"material.{name} moves nothing") as error:
         design(HEAD + ANGLE + WALL + table)
-    assert "line 12, parameter" in error.value.where
+    assert "line 12, [freedom] parameter" in error.value.where
     assert f"material.{instead}" in error.value.remedy
 
 
@@ -250,21 +250,17 @@ def test_what_follows_a_freedom_changes_with_it():
         (HEAD + ANGLE + WALL.replace("wall_mm", "wal_mm"), "did you mean", "line 8"),
         (HEAD + ANGLE + WALL.replace("1.2", "0.2"), "not a range", "line 9"),
         (HEAD + ANGLE.replace("low = 20", "value = 20") + WALL, "no tolerance", "line 3"),
-        (HEAD + ANGLE.replace("low = 20", "low = true") + WALL, "not a number", "line 6"),
         (HEAD + ANGLE + 'objective = "minimise"\n' + WALL, "must have either", "line 3"),
         (HEAD + ANGLE.replace("30", "3000") + WALL, "out of bounds", "line 5"),
         (HEAD + ANGLE + ANGLE + WALL, "two targets are named", "line 7"),
         (HEAD + ANGLE + WALL + WALL, "listed twice", "line 11"),
         (HEAD + ANGLE, "no parameter is free", "freedom"),
         (HEAD + WALL, "no target is given", "target"),
-        (HEAD + "refin = 0.5\n" + ANGLE + WALL, "did you mean 'refine'", "line 3"),
         (HEAD + 'fidelity = "homogenised"\n' + ANGLE + WALL, "unknown key 'fidelity'", "line 3, fidelity"),
         (HEAD + ANGLE + KIND, "not a value of", "line 9"),
-        (HEAD + '[[target]]\nkind = "stiffness"\nlow = 1\n' + WALL, "not an axis", "direction"),
+        (HEAD + '[[target]]\nkind = "stiffness"\nlow = 1\n' + WALL, "direction is missing", "direction"),
         (HEAD + SENSOR + WALL, "path", "path"),
-        (ANGLE + WALL, "format", "format"),
         ("format = 1\n" + ANGLE + WALL, "no unit is given", "design.toml"),
-        (HEAD + "target = 3\n" + WALL, "list of tables", "target"),
         (HEAD + ANGLE.replace("30", "0") + WALL, "the unit at rest", "line 5"),
         (HEAD + ANGLE.replace("angle", "tip_force").replace("30", "-5") + WALL, "toward which", "line 5"),
         (HEAD + FORCE.replace("gap_mm = 2", "gap_mm = 999") + WALL, "gap_mm = 999 is out", "line 6"),
@@ -273,7 +269,6 @@ def test_what_follows_a_freedom_changes_with_it():
         (HEAD + ANGLE + CELL, "does not give column, row and chamber", "line 9"),
         (HEAD + ANGLE + CELL.replace('"0 2"', '"0 2 *"').replace("1.3", "3"), "not a range of", "line 10"),
         (HEAD + ANGLE + CELL.replace('"0 2"', '"0 9 *"'), "0 9 *", "line 9"),
-        (HEAD + "robust = 1\n" + ANGLE + WALL, "neither true nor false", "line 3"),
         (HEAD + "orientation_deg = 400\n" + ANGLE + WALL, "out of bounds", "line 3"),
     ],
 )  # fmt: skip

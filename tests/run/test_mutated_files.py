@@ -19,6 +19,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from mu_addon.usecases.simulate_and_place.job import Job
 
 from mu_addon.design.body import read_body
 from mu_addon.design.gripper import load_gripper
@@ -31,6 +32,7 @@ from mu_addon.files import read_npz, write_npz
 from mu_addon.graph.tree_file import read_tree
 from mu_addon.grasp import read_phases, shipped_phases
 from mu_addon.homogenize.effective_file import read_effective
+from mu_addon.lab_files.tracked_table import read_pixels
 from mu_addon.measured.folder import read_folder
 from mu_addon.run.folder import keep_inputs
 from mu_addon.sensing.recording import read_recording
@@ -39,8 +41,6 @@ from mu_addon.studies.grip import Grip
 from mu_addon.studies.homogenize import Homogenize
 from mu_addon.studies.inputs import ResinInput
 from mu_addon.usecases.resume import use_case_of
-from mu_addon.usecases.simulate_and_place.job import Job
-from mu_addon.usecases.track_video.tracked_table import read_pixels
 
 from ..homogenize.lattice_laws import body_centred
 from .test_reading import READERS

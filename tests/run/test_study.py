@@ -1,10 +1,12 @@
 """The base of all studies: what a result depends on, what a killed or failed run keeps, what is shown."""
 
 import argparse
+import inspect
 import json
 import os
 import subprocess
 import sys
+from functools import cached_property
 from pathlib import Path
 from types import MappingProxyType
 
@@ -28,6 +30,7 @@ from mu_addon.run.results import Results
 from mu_addon.run.stored import content, packed, unpacked
 from mu_addon.run.study import (
     Dropped,
+    Input,
     Over,
     ReadInput,
     Study,
@@ -281,8 +284,9 @@ def test_members_have_their_own_seconds_and_a_file_is_written_once(tmp_path, mon
 
 def test_an_option_takes_so_many_words_or_stands_alone(capsys):
     parser = argparse.ArgumentParser()
-    add_setting(parser, described("at", "", "a place; empty: none"), ("X", "Y"), 2)
-    add_setting(parser, described("sheet", "", "a file; empty: none"), "CSV", alone="unit")
+    two, alone = Input("", metavar=("X", "Y"), many=2), Input("", metavar="CSV", alone="unit")
+    add_setting(parser, described("at", "", "a place; empty: none"), one=two)
+    add_setting(parser, described("sheet", "", "a file; empty: none"), one=alone)
     assert vars(parser.parse_args([])) == {"at": None, "sheet": None}
     assert vars(parser.parse_args(["--sheet", "--at", "1", "-2"])) == {"at": ["1", "-2"], "sheet": "unit"}
     assert parser.parse_args(["--sheet", "a.csv"]).sheet == "a.csv"
@@ -292,7 +296,9 @@ def test_an_option_takes_so_many_words_or_stands_alone(capsys):
 
 
 def _properties(kind):
-    return [name for name, _ in inspect.getmembers(kind, lambda one: isinstance(one, property | cached_property))]
+    return [
+        name for name, _ in inspect.getmembers(kind, lambda one: isinstance(one, property | cached_property))
+    ]
 
 
 @pytest.mark.parametrize("name", STUDIES)

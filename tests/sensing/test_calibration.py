@@ -193,7 +193,7 @@ def test_there_and_back_through_a_file(tmp_path: Path) -> None:
         ("version = 1", "version = 9", "version 9"),
         ("channel", "chanel", "channel"),
         ("coefficients_V = [", "coefficients_V = [9.0, -9.0, ", "monotonic"),
-        ("band_V = ", "band_V = x", "cannot read"),
+        ("band_V = ", "band_V = x", "not TOML"),
         ("gain = 1.0", "gain = -1.0", "numbers are inconsistent"),
     ],
 )

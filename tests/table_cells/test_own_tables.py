@@ -8,11 +8,11 @@ import pytest
 from mu_addon.design.printing.sheets import measured_limits
 from mu_addon.errors import InputError
 from mu_addon.fem.protocol import read_protocol
+from mu_addon.lab_files.tracked_table import read_pixels
 from mu_addon.measured.kinds import KINDS
 from mu_addon.measured.table import read_table
 from mu_addon.sensing.sweeps import _joined_angles
 from mu_addon.table_cells.own_tables import own_lines, own_rows, own_text
-from mu_addon.usecases.track_video.tracked_table import read_pixels
 
 PIXELS = (
     "cl right_px,cl down_px,cr right_px,cr down_px\n400.00,100.00,600.25,100.00\n401.05,100.52,600.25,1.5\n"

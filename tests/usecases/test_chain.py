@@ -69,7 +69,7 @@ def test_options_replace_values_of_the_file(folder):
         ('protocol = "protocol.csv"', "", "neither a protocol nor a target"),
         ("times = 3", "times = 1", "times = 1"),
         ("tip_mass_g = 10", "tip_mass_g = -1", "tip_mass_g = -1"),
-        ("tip_mass_g = 10", 'tip_mass_g = "heavy"', "does not fit"),
+        ("tip_mass_g = 10", 'tip_mass_g = "heavy"', "is not a number"),
         ("refine = 0.25", 'fraction = "half"', "fraction"),
         ('preset = "mu-1.0x"', 'preset = "mu-1.0x"\nfile = "a.toml"', "by preset or by file"),
         ("turn_deg = 90", "turn = 90", "unknown key 'turn'"),

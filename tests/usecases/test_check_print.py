@@ -172,10 +172,10 @@ def test_the_shipped_printer_names_a_source_for_every_limit(tmp_path):
 @pytest.mark.parametrize(
     ("old", "new", "words"),
     [
-        ("value = 0.6", "value = -0.6", "not a number above zero"),
+        ("value = 0.6", "value = -0.6", "value = -0.6 is out of bounds"),
         ("[wall_mm]", "[walls_mm]", "did you mean 'wall_mm'"),
         ("assumed = true", "assumed = 1", "is not true or false"),
-        ("format = 1", "format = 2", "no format = 1"),
+        ("format = 1", "format = 2", "format = 2 is not known"),
     ],
 )
 def test_a_printers_file_with_a_mistake_is_refused(tmp_path, old, new, words):

@@ -11,11 +11,12 @@ import numpy as np
 import pytest
 
 from mu_addon.errors import InputError
+from mu_addon.lab_files.understood import understand
 from mu_addon.measured import read_folder
 from mu_addon.run.context import RunContext
 from mu_addon.run.progress import Progress
-from mu_addon.usecases.import_data.run import import_files
-from mu_addon.usecases.import_data.understood import understand
+from mu_addon.studies.import_ import Import
+from mu_addon.studies.use_case import use_case
 
 from ..lab_files import exports
 from ..lab_files.test_cells import workbook
@@ -32,8 +33,11 @@ def written(tmp_path, text, name="one.csv", encoding="utf-8"):
 
 
 def imported(tmp_path, paths, answers, ask=None):
-    folder = tmp_path / "measured"
-    import_files([*paths], folder, answers, RunContext(Progress()), ask)
+    folder, context = tmp_path / "measured", RunContext(Progress())
+    try:
+        use_case("import").start(Import(paths=tuple(paths), answers=answers, ask=ask), folder, context)
+    finally:
+        context.unlock()
     return read_folder(folder)
 
 
@@ -86,9 +90,9 @@ def test_questions_are_asked_one_by_one(tmp_path):
     said = {"unit.Weg": "mm", "unit.Kraft": "N", **COUPON}
     asked = []
 
-    def ask(proposal, question):
-        asked.append(question.key)
-        return said[question.key]
+    def ask(found):
+        asked.extend(question.key for _, question in found.asked)
+        return {question.key: said[question.key] for _, question in found.asked}
 
     measured = imported(tmp_path, [written(tmp_path, exports.PLAIN)], {}, ask)
     assert asked == ["unit.Weg", "unit.Kraft", "kind", "mode", "section_mm", "length_mm"]
@@ -260,16 +264,3 @@ def test_the_command_line(tmp_path):
     summary = json.loads((tmp_path / "out/summary.json").read_text())
     assert summary["experiments"]["one"]["not_read"] == ["column 'Nr': not a quantity that is read"]
     assert modulus_kPa(read_folder(tmp_path / "out").experiments[0]) == pytest.approx(2500.0, rel=1e-4)
-
-
-def test_a_long_import_tells_one_fraction_that_only_grows(tmp_path, monkeypatch):
-    monkeypatch.setattr("mu_addon.usecases.import_data.run._SHORT_S", 0.0)
-    messages = []
-    paths = [written(tmp_path, exports.PLAIN, f"{n}.csv") for n in range(3)]
-    answers = COUPON | {"unit.Weg": "mm", "unit.Kraft": "N"}
-    import_files(paths, tmp_path / "out", answers, RunContext(Progress([messages.append])))
-    assert messages[0]["type"] == "plan"
-    assert [name for name, _ in messages[0]["stages"]] == ["read", "import"]
-    shares = [message["whole"] for message in messages if message["type"] == "progress"]
-    assert shares == sorted(shares)
-    assert len(set(shares)) >= 7, "each file read, each one written"

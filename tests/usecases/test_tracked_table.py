@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 
 from mu_addon.errors import InputError
-from mu_addon.usecases.track_video.run import followed, read_bench
-from mu_addon.usecases.track_video.tracked_table import read_pixels
+from mu_addon.lab_files.tracked_table import read_pixels
+from mu_addon.studies.track import tracks_in
 
 DEEPLABCUT = """scorer,net,net,net,net,net,net
 bodyparts,cl,cl,cl,cr,cr,cr
@@ -131,15 +131,6 @@ def test_what_cannot_be_used_is_refused(tmp_path, text, what, where, remedy):
 
 
 def test_a_tracker_s_own_file_is_told_what_to_export(tmp_path):
-    pressure = table(tmp_path, "time_s,pressure_kPa\n0,0\n1,5\n", "p.csv")
-    bench = read_bench(
-        table(
-            tmp_path,
-            'base = ["a", "b"]\nfps = 10\n[[marker]]\nname = "a"\nplace_mm = [0, 0]\n'
-            '[[marker]]\nname = "b"\nplace_mm = [9, 0]\n',
-            "bench.toml",
-        )
-    )
     with pytest.raises(InputError, match="not a text table") as caught:
-        followed(table(tmp_path, "x", "net.h5"), bench, pressure, lambda clip, markers: None)
+        tracks_in(table(tmp_path, "x", "net.h5"), None)
     assert "as CSV" in caught.value.remedy

@@ -10,6 +10,9 @@ from bpy.props import BoolProperty, CollectionProperty, StringProperty
 from ...design.printing.finding import counted
 from ...errors import MuError
 from ...files import make_folder
+from ...run.context import RunContext
+from ...run.execution import Execution
+from ...run.progress import Progress
 from ..shared import viewports
 from ..shared.operators import open_file
 from ..shared.panels import wrapped
@@ -118,7 +121,7 @@ class MU_OT_import_page(UnitOperator, bpy.types.Operator):
     bl_options = {"REGISTER"}
 
     def act(self, context, root):
-        from ...usecases.import_data.run import PAGE
+        from ...studies.import_ import PAGE
 
         page = _folder(root) / PAGE
         if not page.exists():
@@ -137,30 +140,32 @@ def _folder(root):
 def _import(operator, root):
     """Import the experiments without open questions; the panel shows the questions left."""
     # Imported late: charts need matplotlib.
-    from ...usecases.import_data.run import write, write_page
-    from ...usecases.import_data.understood import understand
+    from ...report.study_page import write_page
+    from ...studies.import_ import Import
 
     state = root.mu_import
     given = {one.key: one.value.strip() for one in state.answers if one.answered}
-    found = understand([Path(name) for name in state.files.split("\n")], given)
-    folder = _folder(root)
+    files, folder, messages = tuple(map(Path, state.files.split("\n"))), _folder(root), []
     make_folder(folder)
-    if found.open:
+    work = Execution(Import(paths=files, answers=given), folder, RunContext(Progress([messages.append])))
+    work.run()
+    write_page(work)
+    found = work.results.value(("understood", None))
+    if work.fault is not None:
         for p, question in found.asked:
             one = state.answers.add()
             one.key, one.words, one.experiment = question.key, question.words, p.name
             one.choices, one.value = "\n".join(question.choices), question.proposed
-        write_page(found, folder)
         operator.report(
             {"WARNING"}, counted(len(found.asked), "question", "questions") + " in the panel Evidence"
         )
         viewports.redraw()
         return {"FINISHED"}
-    remarks = write(found, folder)
     root.mu_evidence.folder = str(folder)
     _forget(root)
+    remarks = [message for message in messages if message["type"] == "warning"]
     for remark in remarks[:3]:
-        operator.report({"WARNING"}, f"{remark.what} ({remark.where})")
+        operator.report({"WARNING"}, f"{remark['what']} ({remark['where']})")
     operator.report({"INFO"}, counted(len(found.proposals), "experiment", "experiments") + " imported")
     viewports.redraw()
     return {"FINISHED"}

@@ -7,7 +7,10 @@ from pathlib import Path
 import bpy
 from bpy.props import StringProperty
 
-from ...usecases.track_video.run import console_summary, figures, filmed, read_pressure, write_experiment
+from ...run.context import RunContext
+from ...run.execution import Execution
+from ...run.progress import Progress
+from ...studies.track import Track
 from ..shared.operators import reports_errors
 from ..unit import object as unit_object
 from . import properties as bench
@@ -83,14 +86,20 @@ class MU_OT_track_write(bpy.types.Operator):
         if clip is None:
             self.report({"ERROR"}, f"There is no clip {self.clip!r}" if self.clip else NO_CLIP)
             return {"CANCELLED"}
-        described, name = bench.bench_of(clip), bench.title(clip)
-        pressure = read_pressure(Path(bpy.path.abspath(clip.mu_bench.pressure)))
-        found = filmed(tracking.tracks_of(clip), described, pressure, clip.name)
+        study = Track(
+            clip=Path(clip.name),
+            bench=bench.bench_of(clip),
+            pressure=Path(bpy.path.abspath(clip.mu_bench.pressure)),
+            followed=tracking.tracks_of(clip),
+        )
+        messages = []
         folder = Path(bpy.path.abspath(clip.mu_bench.folder))
-        table, remarks = write_experiment(found, described, name, folder)
-        for remark in (*found.remarks, *remarks):
-            self.report({"WARNING"}, remark.what)
-        self.report({"INFO"}, ". ".join(console_summary(figures(found, name, table))))
+        work = Execution(study, folder, RunContext(Progress([messages.append])))
+        work.run()
+        for message in messages:
+            if message["type"] == "warning":
+                self.report({"WARNING"}, message["what"])
+        self.report({"INFO"}, ". ".join(work.lines))
         root = unit_object.active_root(context)
         if root is not None and not root.mu_evidence.folder:
             root.mu_evidence.folder = clip.mu_bench.folder

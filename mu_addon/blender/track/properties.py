@@ -2,7 +2,6 @@
 
 # Blender reads the annotations themselves: no `from __future__ import annotations` here.
 
-from pathlib import Path
 from typing import Any
 
 import bpy
@@ -15,9 +14,9 @@ from bpy.props import (
 )
 
 from ...errors import InputError
+from ...measured.bench import Bench, MarkerSettings
 from ...measured.kinds import ROLES
 from ...measured.video import View
-from ...usecases.track_video.run import Bench, MarkerSettings
 from ..shared.blender_property import exact
 from ..shared.registration import property_group_factory
 from ..unit.properties import BESIDE_BLEND_FILE
@@ -183,18 +182,13 @@ def bench_of(clip: Any) -> Bench:
         follow_base=b.follow_base,
     )
     experiment = {"role": b.role, "scale": exact(b.unit_scale), "orientation_deg": exact(b.orientation_deg)}
-    if b.specimen:
-        experiment["specimen"] = b.specimen
+    named = {"name": b.title, "specimen": b.specimen}
+    experiment |= {key: value for key, value in named.items() if value}
     return Bench(view, MarkerSettings({}, b.marks), exact(b.fps) or None, exact(b.starts_s), experiment)
 
 
 def _pair(values: Any) -> tuple[float, float]:
     return exact(values[0]), exact(values[1])
-
-
-def title(clip: Any) -> str:
-    """Name of the experiment made from a clip."""
-    return clip.mu_bench.title or Path(clip.name).stem
 
 
 register, unregister = property_group_factory(bpy.types.MovieClip, "mu_bench", (MU_PG_bench,))

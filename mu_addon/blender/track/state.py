@@ -11,8 +11,8 @@ import bpy
 import numpy as np
 
 from ...errors import InputError
+from ...measured.bench import MarkerSettings
 from ...measured.video import Tracks
-from ...usecases.track_video.run import MarkerSettings
 
 # Crosses show their rotation; a dot does not, and a tracker that fits its rotation drifts off.
 MODELS = {"crosses": "LocRot", "dots": "Loc"}
@@ -87,7 +87,7 @@ def _place(clip: Any, name: str, at: tuple[float, float], markers: MarkerSetting
     x, y = markers.search_px / 2 / width, markers.search_px / 2 / height
     marker.search_min, marker.search_max = (-x, -y), (x, y)
     track.select = True
-    prepare([track], markers.kind)
+    prepare([track], markers.marks)
 
 
 @contextmanager

@@ -2,18 +2,16 @@
 
 from __future__ import annotations
 
-import math
 from pathlib import Path
 from typing import Any
 
 import attrs
 
 from ...errors import InputError
-from ...reading import file_text, unreadable
+from ...toml_reader import TomlTable, read_toml
 from ...toml_writer import Commented, toml_text
 from ..assets import asset_file, asset_names
 from ..settings import PRINTER
-from ..toml_text import parse, place
 
 DEFAULT = PRINTER.default
 MEANING = {
@@ -96,16 +94,10 @@ def load_printer(name: str = DEFAULT) -> Printer:
 def read_printer(path: str | Path) -> Printer:
     """The printer in a TOML file. Raises InputError with file, line or key, and remedy."""
     path = Path(path)
-    try:
-        text = file_text(path)
-    except (OSError, UnicodeDecodeError) as error:
-        why = unreadable(error)
-        raise InputError(f"cannot read the printer's limits: {why}", str(path), "check the name") from error
     of_limit = ("value", "source", "assumed", "measured")
     keys = {"": ("format", "name", "title"), **dict.fromkeys(MEANING, of_limit)}
-    document = parse(text, keys, str(path))
-    if document.get("format") != 1 or document["format"] is True:
-        raise InputError("the printer's file has no format = 1", place(str(path), None), "write format = 1")
+    table = read_toml(path, "printer's limits", "check the name").only_tables(keys).of_format(1)
+    document = table.values
     missing = [name for name in MEANING if name not in document]
     if missing:
         raise InputError(
@@ -113,7 +105,7 @@ def read_printer(path: str | Path) -> Printer:
             str(path),
             f"add [{missing[0]}] with value and source, or start from a shipped file",
         )
-    limits = {name: _limit(name, document[name], str(path)) for name in MEANING}
+    limits = {name: _limit(table.inner(name)) for name in MEANING}
     if limits["support_mm"].value >= limits["build_z_mm"].value:
         raise InputError(
             "supports take the whole height of the build volume", f"{path}, [support_mm]", "correct it"
@@ -131,18 +123,9 @@ def printer_text(printer: Printer) -> str:
     return toml_text(values)
 
 
-def _limit(name: str, table: dict[str, object], origin: str) -> Limit:
-    value, source = table.get("value"), table.get("source")
-    assumed, measured = table.get("assumed", False), table.get("measured", False)
-    where = f"{origin}, [{name}]"
-    real = isinstance(value, int | float) and not isinstance(value, bool)
-    if not real or not math.isfinite(float(value)) or float(value) <= 0.0:  # type: ignore[arg-type]
-        raise InputError(f"value = {value!r} is not a number above zero", where, MEANING[name])
-    if not isinstance(source, str) or not source.strip():
-        raise InputError("the limit has no source", where, 'write source = "where the figure is from"')
-    for key, flag in (("assumed", assumed), ("measured", measured)):
-        if not isinstance(flag, bool):
-            raise InputError(f"{key} = {flag!r} is not true or false", where, "write true or false")
+def _limit(table: TomlTable) -> Limit:
+    value, source = table.number("value", 0.0, 1e6, above=True), table.word("source")
+    assumed, measured = table.take("assumed", bool, False), table.take("measured", bool, False)
     if assumed and measured:
-        raise InputError("the limit is both assumed and measured", where, "leave one of them out")
-    return Limit(float(value), source, bool(assumed), bool(measured))  # type: ignore[arg-type]
+        raise InputError("the limit is both assumed and measured", table.at(), "leave one of them out")
+    return Limit(value, source, assumed, measured)

@@ -12,7 +12,7 @@ from collections.abc import Iterable, Sequence
 from pathlib import Path
 
 from ...errors import InputError
-from ...reading import unreadable
+from ...reading import text_in
 from ...table_cells.own_tables import own_lines, own_rows, own_text
 from ..coupons import FEATURES, offsets
 from ..parameters import Unit
@@ -39,9 +39,7 @@ def _sheet_text(columns: Sequence[str], rows: Iterable[Sequence[str]]) -> str:
 def _sheet_rows(path: Path, remedy: str) -> list[tuple[str, dict[str, str]]]:
     """Rows of a filled sheet, each with its location; raises InputError with the remedy."""
     try:
-        rows = own_rows(own_lines(own_text(path, _LONGEST)))
-    except (OSError, UnicodeDecodeError) as error:
-        raise InputError(f"cannot read the sheet: {unreadable(error)}", str(path), remedy) from error
+        rows = own_rows(own_lines(text_in(path, "sheet", remedy, _LONGEST, own_text)))
     except csv.Error as error:
         raise InputError(f"cannot read the sheet: {error}", str(path), remedy) from error
     names = rows[0][1] if rows else []

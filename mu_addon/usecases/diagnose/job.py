@@ -112,7 +112,8 @@ class Job:
 def read_job(folder: Path) -> Job:
     """The job that a folder of `diagnose` describes, its data at their original path; raises InputError."""
     path = folder / LAYOUT.inputs
-    values, run = read_inputs(path)
+    table, run = read_inputs(path)
+    values = table.values
     if "settings" in values:
         raise InputError("this run was made with settings given in Python", str(path), "run it there again")
     measured = read_folder(named_path(path, run, "data", "folder of measured data"))

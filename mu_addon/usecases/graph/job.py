@@ -13,7 +13,7 @@ from ...graph.runs import FOLDER
 from ...graph.tree import NodeTree, with_absolute_paths
 from ...graph.tree_file import HEADER, read_tree, tree_of, tree_text
 from ...run.folder import FolderLayout
-from ...run.inputs import read_toml
+from ...toml_reader import read_toml
 from .definitions import definitions
 
 NAME, STATES, REPORT = "graph.toml", "nodes.json", "report.html"
@@ -67,12 +67,6 @@ def read_job(folder: Path) -> Job:
     """The job that a folder of `graph` describes; raises InputError."""
     path = folder / NAME
     document = read_toml(path)
-    run = document.pop("run", {})
-    wanted, reports = run.get("wanted", []), run.get("node_reports", False)
-    good = isinstance(wanted, list) and all(isinstance(name, str) for name in wanted)
-    if not (good and isinstance(reports, bool)):
-        raise InputError(
-            "its table [run] cannot be used", str(path), "remove it: all ends are evaluated then"
-        )
-    tree = with_absolute_paths(tree_of(document, str(path)), definitions(), folder.absolute())
-    return Job(tree, tuple(wanted), reports)
+    run = document.inner("run")
+    tree = with_absolute_paths(tree_of(document), definitions(), folder.absolute())
+    return Job(tree, run.words("wanted"), run.take("node_reports", bool, False))

@@ -52,7 +52,10 @@ def node_of(name: str) -> Definition:
         tuple(SOCKETS[one.kind][0] for one in inputs.values() if one.kind in SOCKETS),
         tuple(Output(*one) for one in node.outputs),
         tuple(
-            Setting(d, one.path) for one in inputs.values() if one.kind != "window" for d in one.descriptions
+            Setting(d, one.path)
+            for one in inputs.values()
+            if one.kind not in ("window", *SOCKETS)
+            for d in one.descriptions
         ),
         order=lambda call: _order(kind, call),
         read=read,

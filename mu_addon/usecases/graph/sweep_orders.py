@@ -18,6 +18,7 @@ from ...studies.sweep import LAST, TABLE, Sweep
 from ...studies.unit_inputs import protocol_of
 from ...studies.unit_ranking import UnitStudy
 from ...studies.use_case import use_case
+from ...toml_reader import TomlTable
 from ..parameter_study.plan import Plan
 from ..parameter_study.variable import Inputs, changed_inputs, variable
 from ..simulate_and_place.settings import STAGES
@@ -76,7 +77,7 @@ def _plan_of(call: Call) -> Plan:
             "ranges",
             "leave one of them out, or vary another parameter",
         )
-    variables = tuple(variable(name, dict(table), call.node) for name, table in ranges)
+    variables = tuple(variable(name, TomlTable(table, call.node)) for name, table in ranges)
     # A setting that is wrong for every point is reported before any work.
     UnitStudy.of_tables(tables, Path(call.node), unit=design.unit, protocol=protocol, workers=1)
     return Plan(

@@ -17,11 +17,11 @@ from ...design.parameters import Unit, load_preset, read_unit
 from ...errors import InputError, MuError
 from ...materials.library import load_material, read_material
 from ...meshing.settings import SELF_CONTACT
-from ...reading import parse_toml
 from ...run.folder import RUN
-from ...run.inputs import FORMAT, read_inputs, read_toml, structured
+from ...run.inputs import FORMAT, read_inputs
 from ...studies.unit_inputs import protocol_of
 from ...studies.unit_ranking import UnitStudy
+from ...toml_reader import TomlTable, parsed_toml, read_toml
 from ..simulate_and_place.settings import STAGES
 from .point import Task
 from .settings import GRID, LAST_STAGE, MEMORY, METHOD, MINUTES, MOST_POINTS, POINTS, RESIN, SEED, SOBOL
@@ -175,8 +175,8 @@ class Plan:
         counts: tuple[int, ...] = ()
         with suppress(InputError):
             document, run = read_inputs(file)
-            same = document.get("method") == self.method and document.get("seed") == self.seed
-            if same and list(document.get("vary", {})) == [v.name for v in self.variables]:
+            same = all(document.values.get(name) == getattr(self, name) for name in ("method", "seed"))
+            if same and list(document.inner("vary").values) == [v.name for v in self.variables]:
                 counts = counts_of(run.get("points"), str(file))
         count = (counts[-1] if counts and add else max([self.count, *counts])) + add
         return attrs.evolve(self, counts=counts if counts[-1:] == (count,) else (*counts, count))
@@ -191,6 +191,10 @@ class Plan:
             **self.inputs.tables,
             "vary": {v.name: v.table for v in self.variables},
         }
+
+
+_OWN = ("method", "seed", "memory_MB", "minutes", "resin", "minimize", "maximize")
+"""Keys of sweep.toml that the plan has as they are."""
 
 
 @attrs.frozen
@@ -213,67 +217,55 @@ class _File:
 
 def read_plan(path: Path) -> Plan:
     """The sweep of a TOML file; raises InputError."""
-    document = read_toml(path, "parameter study", "give the path of a TOML file")
-    return _plan_of(document, path.parent, str(path))
+    return _plan_of(read_toml(path, "parameter study", "give the path of a TOML file"), path.parent)
 
 
 def parse_plan(text: str, folder: Path, where: str = "sweep.toml") -> Plan:
     """The sweep of TOML text; folder: where the files lie that it names. Raises InputError."""
-    return _plan_of(parse_toml(text, where), folder, where)
+    return _plan_of(parsed_toml(text, where), folder)
 
 
-def _plan_of(document: dict[str, Any], folder: Path, where: str) -> Plan:
+def _plan_of(document: TomlTable, folder: Path) -> Plan:
     """The sweep of a document that a user wrote."""
-    found = document.pop("format", "missing")
-    if found != FORMAT or isinstance(found, bool):
-        raise InputError(f"format = {found}", where, f"write format = {FORMAT}")
-    document.pop(RUN, None)
-    last = document.get("stages", LAST_STAGE.default)
-    simulate = document.get("simulate", {})
-    # What is no table is refused later, by name.
-    if isinstance(simulate, dict) and last != STAGES[0]:
-        document["simulate"] = {"self_contact": SELF_CONTACT.default} | simulate
-    given = [document.get(name) for name in ("preset", "unit") if document.get(name)]
+    keys = {k: v for k, v in document.of_format(FORMAT).values.items() if k not in ("format", RUN)}
+    if document.word("stages", default=LAST_STAGE.default) != STAGES[0]:
+        keys["simulate"] = {"self_contact": SELF_CONTACT.default} | dict(document.inner("simulate").values)
+    given = [name for name in ("preset", "unit") if keys.get(name)]
     if len(given) != 1:
-        raise InputError("no unit is given", where, 'write preset = "mu-1.0x" or unit = "my-unit.toml"')
+        what = 'write preset = "mu-1.0x" or unit = "my-unit.toml"'
+        raise InputError("no unit is given", document.at(), what)
 
     def unit(file: _File) -> Unit:
         return load_preset(file.preset) if file.preset else read_unit(folder / file.unit)
 
-    return planned(document, unit, folder, where)
+    return planned(attrs.evolve(document, values=keys), unit, folder)
 
 
-def planned(
-    document: Mapping[str, Any], unit: Any, files: Path, where: str, counts: tuple[int, ...] = ()
-) -> Plan:
+def planned(document: TomlTable, unit: Any, files: Path, counts: tuple[int, ...] = ()) -> Plan:
     """The plan of sweep.toml's keys; unit: its unit, or what gives it of the plain keys. Raises InputError.
 
     files: folder of the files that it names; counts: numbers of points by which an earlier run grew.
     """
-    keys = dict(document)
-    vary, tables = keys.pop("vary", None), {name: keys.pop(name) for name in STAGES if name in keys}
-    if not isinstance(vary, dict) or not vary:
-        raise InputError(
-            "no input is varied",
-            where,
-            'add [vary] and lines like "chambers.wall_mm" = { low = .., high = .. }',
-        )
-    file = structured(_File, keys, where)
+    vary = document.inner("vary")
+    if not vary.values:
+        remedy = 'add [vary] and lines like "chambers.wall_mm" = { low = .., high = .. }'
+        raise InputError("no input is varied", document.at(), remedy)
+    plain = {k: v for k, v in document.values.items() if k not in ("vary", *STAGES)}
+    file = attrs.evolve(document, values=plain).made(_File)
     stages = STAGES[: STAGES.index(file.stages) + 1]
-    for name in tables:
-        if name not in stages:
-            raise InputError(
-                f"[{name}] is not one of its stages", where, f'write stages = "{name}", or leave it out'
-            )
-    settings = {name: _settings(tables.get(name, {}), name, where) for name in stages}
-    variables = tuple(variable(name, given, where) for name, given in _flat(vary).items())
+    for name in STAGES:
+        if name in document and name not in stages:
+            remedy = f'write stages = "{name}", or leave it out'
+            raise InputError(f"[{name}] is not one of its stages", document.at(name), remedy)
+    settings = {name: _settings(document.inner(name)) for name in stages}
+    variables = tuple(variable(name, table) for name, table in _flat(vary).items())
     protocol = protocol_of(files / file.protocol if file.protocol else None)
     inputs = Inputs(unit(file), protocol, settings)
-    plain = ("method", "seed", "memory_MB", "minutes", "resin", "minimize", "maximize")
-    own = {name: getattr(file, name) for name in plain}
+    own = {name: getattr(file, name) for name in _OWN}
     plan = Plan(inputs, variables, files, count=file.points, counts=counts or (file.points,), **own)
     # A setting that is wrong for every point is reported before any work, and not as many failures.
-    UnitStudy.of_tables(settings, Path(where), unit=inputs.unit, protocol=inputs.protocol, workers=1)
+    tables = {name: attrs.evolve(document.inner(name), values=table) for name, table in settings.items()}
+    UnitStudy.of_tables(tables, Path(document.origin), unit=inputs.unit, protocol=inputs.protocol, workers=1)
     for v in variables:
         if v.name == FILE:
             for name in v.values:
@@ -289,24 +281,22 @@ def counts_of(found: Any, where: str) -> tuple[int, ...]:
     return tuple(listed)
 
 
-def _flat(vary: Mapping[str, Any], before: str = "") -> dict[str, Any]:
+def _flat(vary: TomlTable, before: str = "") -> dict[str, TomlTable]:
     """Variables by their whole name: TOML reads chambers.wall_mm without quotes as a table in a table."""
-    found: dict[str, Any] = {}
-    for key, value in vary.items():
-        name = f"{before}{key}"
-        last = not isinstance(value, dict) or not value or any(k in value for k in ("low", "high", "values"))
-        found |= {name: value} if last else _flat(value, f"{name}.")
+    found: dict[str, TomlTable] = {}
+    for key in vary.values:
+        table = vary.inner(key)
+        last = not table.values or any(k in table for k in ("low", "high", "values"))
+        found |= {f"{before}{key}": table} if last else _flat(table, f"{before}{key}.")
     return found
 
 
-def _settings(found: Any, stage: str, where: str) -> dict[str, Any]:
-    if not isinstance(found, dict):
-        raise InputError(f"{stage} is not a table", where, f"write it as [{stage}]")
-    for key in found:
+def _settings(table: TomlTable) -> dict[str, Any]:
+    for key in table.values:
         if key in OF_FILES:
             raise InputError(
                 f"a parameter study does not take {key}",
-                f"{where}, [{stage}]",
+                table.at(key),
                 "leave it out; unit and protocol are named at the top of the file",
             )
-    return dict(found)
+    return dict(table.values)

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import copy
-import math
 from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
@@ -17,6 +16,7 @@ from ...errors import InputError, did_you_mean
 from ...fem.protocol import Protocol, read_protocol
 from ...meshing.settings import OF_CONTINUUM, MeshSettings, require_printed
 from ...studies.unit_ranking import UnitStudy
+from ...toml_reader import TomlTable
 
 FACTOR = "protocol.factor"
 FILE = "simulate.protocol"
@@ -74,47 +74,32 @@ class Variable:
         return {"low": self.low, "high": self.high, "log": self.log, "steps": self.steps}
 
 
-def variable(name: str, given: Any, where: str) -> Variable:
-    """A variable from its table in sweep.toml; raises InputError."""
-    where = f"{where}, [vary] {name}"
-    require_printed(name, where)
+def variable(name: str, table: TomlTable) -> Variable:
+    """A variable of its name and its table in sweep.toml; raises InputError."""
+    require_printed(name, table.at())
     if name not in variable_names():
         raise InputError(
             f"unknown input {name!r}{did_you_mean(name, variable_names())}",
-            where,
+            table.at(),
             "name it as in unit.toml (chambers.wall_mm) or in study.toml (simulate.mesh.refine)",
         )
-    if not isinstance(given, dict) or not (set(given) == {"values"} or {"low", "high"} <= set(given)):
-        raise InputError(
-            f"{given!r} does not define a range",
-            where,
-            "write { low = 0.8, high = 1.2 } or { values = [1, 2] }",
-        )
-    if "values" in given:
-        values = given["values"]
-        if not isinstance(values, list) or not values:
-            raise InputError(f"values = {values!r} is not a list", where, "write values = [1, 2]")
-        return Variable(name, values=tuple(values))
-    unknown = set(given) - {"low", "high", "log", "steps"}
-    if unknown:
-        raise InputError(
-            f"unknown key {unknown.pop()!r}", where, "known: low, high, log, steps, or values alone"
-        )
-    low, high, log, steps = given["low"], given["high"], given.get("log", False), given.get("steps", STEPS)
-    numbers = all(
-        isinstance(v, int | float) and not isinstance(v, bool) and math.isfinite(v) for v in (low, high)
-    )
-    if not numbers or not low < high:
-        raise InputError(
-            f"low = {low!r} and high = {high!r} are not a range", where, "give two numbers with low < high"
-        )
-    if not isinstance(log, bool) or (log and low <= 0):
-        raise InputError(
-            f"log = {log!r} with low = {low!r}", where, "write log = true only where low is positive"
-        )
-    if isinstance(steps, bool) or not isinstance(steps, int) or not 2 <= steps <= 1000:
-        raise InputError(f"steps = {steps!r}", where, "give a whole number from 2 to 1000")
-    return Variable(name, low, high, log=log, steps=steps)
+    if "values" in table:
+        values = table.only(("values",)).take("values", tuple[Any, ...])
+        if not values:
+            raise InputError("the list of values is empty", table.at("values"), "write values = [1, 2]")
+        return Variable(name, values=values)
+    table.only(("low", "high", "log", "steps"))
+    for key in ("low", "high"):
+        table.number(key)
+    low, high, log = table.values["low"], table.values["high"], table.take("log", bool, False)
+    if not low < high:
+        what = f"low = {low!r} and high = {high!r} are not a range"
+        raise InputError(what, table.at("low"), "give two numbers with low < high, or values = [1, 2]")
+    if log and low <= 0:
+        what = f"log = {log!r} with low = {low!r}"
+        raise InputError(what, table.at("log"), "write log = true only where low is positive")
+    steps = table.take("steps", int, STEPS)
+    return Variable(name, low, high, log=log, steps=int(table.bounded("steps", steps, 2, 1000)))
 
 
 def variable_names() -> list[str]:

@@ -10,7 +10,7 @@ import attrs
 from ...errors import InputError, MuError
 from ...run.context import RunContext
 from ...run.folder import FolderLayout
-from ...run.inputs import FORMAT, read_inputs, structured
+from ...run.inputs import FORMAT, read_inputs
 from ...run.usecase import UseCase
 from ...sensing.reconnecting import Control
 from ...sensing.session import run_session
@@ -54,9 +54,7 @@ class Job:
 
 def read_job(folder: Path) -> Job:
     """The job that a folder of a recording describes; raises InputError."""
-    path = folder / LAYOUT.inputs
-    values, _ = read_inputs(path)
-    return structured(Job, values, str(path))
+    return read_inputs(folder / LAYOUT.inputs)[0].made(Job)
 
 
 def record(job: Job, folder: Path, context: RunContext) -> Path:

@@ -36,9 +36,7 @@ PATH_DIFFERENCE_SHARE = 0.02
 CONTACT_REACH = "from {:.6g} s on ({}: no equilibrium at {:.4g} kPa)"
 
 
-def waveguides_of(
-    mechanics: Mechanics, mesh: Mesh, candidates: Sequence[Candidate]
-) -> PrintedWaveguides:
+def waveguides_of(mechanics: Mechanics, mesh: Mesh, candidates: Sequence[Candidate]) -> PrintedWaveguides:
     """Solver of a unit's candidates on a mesh, in one thread."""
     return PrintedWaveguides(
         mechanics.unit,

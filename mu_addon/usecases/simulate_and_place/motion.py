@@ -37,7 +37,7 @@ def mesh_of(
     cache: Path,
     on_progress: Callable[[float], None],
 ) -> Mesh:
-    """Analysis mesh of a unit's shape; a wall with memory has no beams. Raises InputError and MeshingError."""
+    """Analysis mesh of a unit's shape; a wall with memory has no beams. InputError, MeshingError."""
     return mesh_printed(shape, settings, lambda _, share: on_progress(share), cache, body, solid=has_memory)
 
 
@@ -83,7 +83,7 @@ def reached_of(
 
 @attrs.frozen(eq=False)
 class MotionTables:
-    """What is read off a motion: rows of stretch.csv, walls that cross (`crossings`), figures of the solver."""
+    """What is read off a motion: rows of stretch.csv, walls that cross (`crossings`), the solver."""
 
     stretch: tuple[Row, ...]
     walls_cross: dict[str, tuple[str, ...]]

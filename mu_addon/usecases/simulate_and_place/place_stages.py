@@ -51,7 +51,7 @@ Growing = Generator[list[Any], Sequence[Any], Any]
 
 
 def require_paths(unit: Unit, body: Body | None, limits: Limits | None) -> None:
-    """Raise InputError if no path can be placed: no window fits a waveguide, no chain is within the limits."""
+    """Raise InputError if no path can be placed: no window fits a waveguide, no chain the limits."""
     if limits is not None:
         chains_within(unit, limits)
         return

@@ -93,7 +93,8 @@ def answer_parts(
         if ranking.tied:
             within = f" ({ranking.uncertainty_mm:.3f} mm)" if ranking.uncertainty_mm is not None else ""
             yield Sentence(
-                f"Within the mesh uncertainty it is tied with {listed([label(n) for n in ranking.tied])}; they "
+                "Within the mesh uncertainty it is tied with "
+                f"{listed([label(n) for n in ranking.tied])}; they "
                 f"differ by less than the uncertainty{within}."
             )
         yield from _key_figures(ranking, motion)
@@ -317,7 +318,8 @@ def search_parts(study: Any, solid: Solid, found: SearchOutcome, predicted: Pred
     certain = f"less than {max(found.risk, 1e-3):.1%}" if found.risk < 0.5 else f"up to {found.risk:.0%}"
     yield Sentence(
         f"Of {found.count} paths through nodes of the lattice, bent paths included, {best.name} has the "
-        f"smallest deviation: {best.j_hat:.3f} mm. All were ranked by a reduced model; the {len(solved)} below "
+        f"smallest deviation: {best.j_hat:.3f} mm. All were ranked by a reduced model; the {len(solved)} "
+        "below "
         f"were solved by the full model. The probability that another path is better is {certain}, if the "
         "reduced model is as accurate for the others as for these. Paths marked “best for their length” are "
         "Pareto-optimal in deviation and length.",
@@ -350,7 +352,10 @@ def _search_picture(study: Any, solid: Solid, best: LatticePath) -> list[tuple[s
     parts, anchors, radius = _parts(study, solid)
     side = -1.0 if best.points[:, 0].sum() < 0 else 1.0
     image = png(portrait(parts, anchors, best.points * [side, 1.0, 1.0], radius))
-    caption = f"The best path of the lattice, {best.name}, before the unit cut open; its mirror image is equivalent."
+    caption = (
+        f"The best path of the lattice, {best.name}, before the unit cut open; its mirror image is "
+        "equivalent."
+    )
     alt = "The unit cut along its plane of bending, and the path of the sensor through its lattice."
     return [("", Picture(image, caption, alt))]
 

@@ -7,7 +7,7 @@ from mu_addon.blender.track import properties as bench
 from mu_addon.blender.track import state as tracking
 from mu_addon.blender.unit import object as unit_object
 from mu_addon.measured import read_folder
-from mu_addon.usecases.track_video.run import MarkerSettings
+from mu_addon.measured.bench import MarkerSettings
 
 from .acting import add, refused
 

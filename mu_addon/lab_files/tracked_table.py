@@ -16,13 +16,13 @@ from typing import Any
 import attrs
 import numpy as np
 
-from ...errors import InputError
-from ...lab_files.columns import column, unit_of
-from ...measured.table import Remark
-from ...measured.video import Tracks
-from ...reading import require_rows, unreadable
-from ...table_cells.notation import is_like_number
-from ...table_cells.own_tables import own_lines, own_rows, own_text
+from ..errors import InputError
+from ..measured.table import Remark
+from ..measured.video import Tracks
+from ..reading import require_rows, text_in
+from ..table_cells.notation import is_like_number
+from ..table_cells.own_tables import own_lines, own_rows, own_text
+from .columns import column, unit_of
 
 Array = np.ndarray[Any, Any]
 Line = tuple[int, str]
@@ -89,16 +89,12 @@ def read_pixels(path: Path) -> Tracks:
     This program's layout has `NAME right_px` and `NAME down_px`, one row a frame, empty if a marker was lost;
     time_s, if present, is the time of each. Tables of other trackers need x to the right and y downward.
     """
+    text = text_in(path, "tracked markers", "check path and file", read=own_text)
     try:
-        text = own_text(path)
         lines = _lines_of_kinovea(text, str(path)) if text.startswith(_KINOVEA) else own_lines(text)
         require_rows(len(lines) - 1, str(path))
         layout = _layout(lines, str(path))
         heading, *body = own_rows(lines[layout.heading :])
-    except (OSError, UnicodeDecodeError) as error:
-        raise InputError(
-            f"cannot read the tracked markers: {unreadable(error)}", str(path), "check path and file"
-        ) from error
     except csv.Error as error:
         raise InputError(f"not CSV: {error}", str(path), "separate the columns by commas") from error
     units, body = _below(layout, body)

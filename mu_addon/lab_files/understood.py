@@ -8,15 +8,15 @@ from pathlib import Path
 
 import attrs
 
-from ...errors import InputError
-from ...lab_files.blocks import FEWEST, Block, tables
-from ...lab_files.keys import ANSWERS
-from ...lab_files.proposal import NoExperiment, Proposal, Question
-from ...lab_files.sheet import Sheet
-from ...lab_files.source import read_sheets
-from ...lab_files.steps import answers_for, propose
-from ...table_cells.notation import DECIMALS
-from ..track_video.tracked_table import read_pixels
+from ..errors import InputError
+from ..table_cells.notation import DECIMALS
+from .blocks import FEWEST, Block, tables
+from .keys import ANSWERS
+from .proposal import NoExperiment, Proposal, Question
+from .sheet import Sheet
+from .source import read_sheets
+from .steps import answers_for, propose
+from .tracked_table import read_pixels
 
 # One answer for all of a file: its decimal sign.
 DECIMAL = "decimal"

@@ -1,1 +1,0 @@
-"""Import of laboratory files into a folder of measured data."""
