@@ -27,14 +27,14 @@ from pathlib import Path
 import attrs
 import numpy as np
 import pytest
+from mu_addon.usecases.simulate_and_place.run import run_stages
+from mu_addon.usecases.simulate_and_place.study import Study
 
 from benchmarks.table import ROOT, circumstances, options_of, print_head
 from mu_addon.errors import MuError, OutputError
 from mu_addon.run.context import run_to_end
 from mu_addon.run.folder import keep_inputs
 from mu_addon.run.progress import Progress
-from mu_addon.usecases.simulate_and_place.run import run_stages
-from mu_addon.usecases.simulate_and_place.study import Study
 from tests.headless.test_resume import JOB as COARSE
 from tests.run.failing_files import failing
 from tests.run.failing_memory import short_of_memory

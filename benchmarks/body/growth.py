@@ -23,7 +23,8 @@ from mu_addon.design.parameters import Unit, load_preset
 from mu_addon.errors import MuError
 from mu_addon.fem.equilibrium import Equilibrium
 from mu_addon.meshing.settings import MeshSettings
-from mu_addon.usecases.simulate_and_place.job import Job, grasp
+from mu_addon.studies.unit_inputs import grasp
+from mu_addon.studies.unit_ranking import UnitStudy
 
 STEP_KPA = -1.0
 
@@ -63,7 +64,7 @@ def main() -> None:
 def costs(unit: Unit, solid: bool, refine: float) -> list[str]:
     """Cells of a row of the table: unknowns, seconds, factorisations of the load step, gigabytes."""
     settings = MeshSettings(refine=refine)
-    job = Job(unit, grasp(), settings, stages=("design", "simulate"), mesh_check=False)
+    job = UnitStudy(unit, grasp(), settings, stages=("design", "simulate"), mesh_check=False)
     meshed, mesh = seconds(lambda: mesh_printed(unit, settings, solid=solid))
     model = job.model(mesh, threads=1)
     equilibrium = Equilibrium(model, job.materials(mesh), job.newton)

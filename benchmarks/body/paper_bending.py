@@ -21,7 +21,7 @@ from benchmarks.table import options_of, print_head, print_row
 from mu_addon.design.parameters import load_preset
 from mu_addon.errors import MuError
 from mu_addon.meshing.settings import MeshSettings
-from mu_addon.usecases.simulate_and_place.job import Job
+from mu_addon.studies.unit_ranking import UnitStudy
 
 from .running import angles_deg, outward, run_study
 
@@ -68,7 +68,7 @@ def main() -> None:
                 folder = f"{name}-{shape}-{options.refine:g}-{side[0]:g}".replace(" ", "-")
                 began = time.process_time()
                 try:
-                    job = Job(
+                    job = UnitStudy(
                         load_preset(name).evolve(**SHAPES[shape]),
                         protocol,
                         MeshSettings(refine=options.refine),

@@ -7,13 +7,13 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+from mu_addon.usecases.simulate_and_place.run import simulate_and_place
+from mu_addon.usecases.simulate_and_place.study import Study, begin_study
 
 from mu_addon.fem.protocol import Protocol
 from mu_addon.run.context import RunContext
 from mu_addon.run.progress import Progress
-from mu_addon.usecases.simulate_and_place.job import Job
-from mu_addon.usecases.simulate_and_place.run import simulate_and_place
-from mu_addon.usecases.simulate_and_place.study import Study, begin_study
+from mu_addon.studies.unit_ranking import UnitStudy
 
 
 def outward(pressures_kPa: Sequence[float]) -> Protocol:
@@ -24,7 +24,7 @@ def outward(pressures_kPa: Sequence[float]) -> Protocol:
     return Protocol(np.arange(float(len(pressures))), np.array(pressures))
 
 
-def run_study(job: Job, folder: Path) -> tuple[Study, dict[str, Any]]:
+def run_study(job: UnitStudy, folder: Path) -> tuple[Study, dict[str, Any]]:
     """The study and its summary; a run that was stopped goes on in its folder. May raise MuError."""
     context = RunContext(Progress())
     begin_study(job, folder, context)

@@ -19,7 +19,7 @@ from benchmarks.table import options_of, print_head, print_row
 from mu_addon.design.parameters import load_preset
 from mu_addon.errors import MuError
 from mu_addon.meshing.settings import MeshSettings
-from mu_addon.usecases.simulate_and_place.job import Job
+from mu_addon.studies.unit_ranking import UnitStudy
 
 from .running import angles_deg, outward, run_study
 
@@ -44,7 +44,7 @@ def main() -> None:
             began = time.process_time()
             mesh = MeshSettings(refine=refine)
             touch = not options.without_contact
-            job = Job(
+            job = UnitStudy(
                 unit, protocol, mesh, times=len(pressures), mesh_check=False, workers=1, self_contact=touch
             )
             folder = options.folder / f"{name}-{options.chambers}-{refine:g}{'' if touch else '-passing'}"

@@ -15,7 +15,8 @@ from mu_addon.cli.main import main
 from mu_addon.design.parameters import load_preset
 from mu_addon.fem.protocol import Protocol
 from mu_addon.meshing.settings import MeshSettings
-from mu_addon.usecases.simulate_and_place.job import Job, write_study
+from mu_addon.studies.unit_ranking import UnitStudy
+from mu_addon.studies.use_case import write_study
 
 ROOT = Path(__file__).resolve().parents[2]
 # No measure of speed: what hangs must end some time.
@@ -30,7 +31,7 @@ def coarse(folder, unit=UNIT, **changes):
     """Write the main job, small, into a folder, and return the command that runs it."""
     folder.mkdir(parents=True, exist_ok=True)
     small = {"mesh": MeshSettings(refine=0.35), "times": 4, "stations": 11}
-    write_study(Job(unit, MILD, **(small | changes)), folder)
+    write_study(UnitStudy(unit, MILD, **(small | changes)), folder)
     return "resume", folder
 
 

@@ -10,7 +10,8 @@ import pytest
 from mu_addon.design.parameters import load_preset, read_unit, to_toml
 from mu_addon.fem.protocol import read_protocol
 from mu_addon.meshing.settings import MeshSettings
-from mu_addon.usecases.simulate_and_place.job import Job, write_study
+from mu_addon.studies.unit_ranking import UnitStudy
+from mu_addon.studies.use_case import write_study
 from mu_addon.usecases.simulate_and_place.settings import STAGES
 
 from .processes import assert_clear_failure, command, here, run
@@ -91,7 +92,7 @@ def test_a_protocol_that_bursts_the_unit_keeps_the_states_before(tmp_path):
     file, unit = tmp_path / "burst.csv", three_chambers(tmp_path)
     file.write_text("time_s,pressure_kPa\n0,0\n1,1000\n")
     out = tmp_path / "out"
-    job = Job(
+    job = UnitStudy(
         read_unit(unit),
         read_protocol(file),
         MeshSettings(refine=0.2),

@@ -11,11 +11,11 @@ import pytest
 
 from mu_addon.meshing.settings import MeshSettings
 from mu_addon.run.folder import keep_inputs
-from mu_addon.usecases.simulate_and_place.job import Job
+from mu_addon.studies.unit_ranking import UnitStudy
 
 from .processes import MILD, ROOT, UNIT, assert_clear_failure, command, here, is_running, run, worker_of
 
-JOB = Job(
+JOB = UnitStudy(
     UNIT,
     MILD,
     mesh=MeshSettings(refine=0.35),

@@ -19,7 +19,6 @@ from typing import Any
 
 import numpy as np
 import pytest
-from mu_addon.usecases.simulate_and_place.job import Job
 
 from mu_addon.design.body import read_body
 from mu_addon.design.gripper import load_gripper
@@ -40,6 +39,7 @@ from mu_addon.studies.check import Check
 from mu_addon.studies.grip import Grip
 from mu_addon.studies.homogenize import Homogenize
 from mu_addon.studies.inputs import ResinInput
+from mu_addon.studies.unit_ranking import UnitStudy
 from mu_addon.usecases.resume import use_case_of
 
 from ..homogenize.lattice_laws import body_centred
@@ -237,7 +237,7 @@ JOBS: dict[str, Any] = {
     "check": Check(printer=load_printer(), unit=load_preset("mu-1.0x")),
     "grip": Grip(gripper=load_gripper("gripper")),
     "homogenize": Homogenize(unit=load_preset("mu-1.0x"), resin=ResinInput().made(("flexible-80a",), {})),
-    "place": Job(load_preset("mu-1.0x"), Protocol(np.arange(3.0), np.array([0.0, -20.0, 40.0]))),
+    "place": UnitStudy(load_preset("mu-1.0x"), Protocol(np.arange(3.0), np.array([0.0, -20.0, 40.0]))),
 }
 
 

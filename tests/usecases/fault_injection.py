@@ -30,10 +30,10 @@ from mu_addon.run.progress import Progress
 from mu_addon.sensing.framing import info_frame, sample_frame
 from mu_addon.sensing.recording import read_recording
 from mu_addon.sensing.sources import EndOfStream
+from mu_addon.studies.unit_ranking import UnitStudy
 from mu_addon.usecases.parameter_study.point import Outcome, Task
 from mu_addon.usecases.simulate_and_place import light, study
 from mu_addon.usecases.simulate_and_place import run as placing
-from mu_addon.usecases.simulate_and_place.job import Job
 
 Run = Callable[[Path, RunContext], Any]
 Messages = list[dict[str, Any]]
@@ -180,7 +180,7 @@ def inject_each(
 
 
 UNIT = load_preset("mu-1.0x")
-STUDY = Job(
+STUDY = UnitStudy(
     unit=attrs.evolve(UNIT, chambers=attrs.evolve(UNIT.chambers, count=3)),
     protocol=PressureProtocol(np.arange(3.0), np.array([0.0, -2.0, 2.0])),
     mesh=MeshSettings(refine=0.35),

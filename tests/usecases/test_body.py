@@ -9,7 +9,7 @@ from mu_addon.cli.main import main
 from mu_addon.design.body import envelope
 from mu_addon.design.parameters import load_preset, to_toml
 from mu_addon.design.surface import stl_bytes
-from mu_addon.usecases.simulate_and_place.job import read_job
+from mu_addon.studies.unit_ranking import UnitStudy
 
 from ..design.bodies import cylinder
 
@@ -48,16 +48,16 @@ def test_design_in_a_body(files, capsys):
     assert summary["body"]["low_mm"][2] == 0.0
     assert summary["body"]["high_mm"][2] == 37.5
     assert summary["gates"]["unit_alpha1.stl"]["components"] == 1
-    job = read_job(out)
+    job = UnitStudy.read(out)
     assert job.body is not None
     assert job.body.hash == envelope(job.body, job.unit.dimensions).hash
     # The study keeps the body it was made with: the file may go.
     shutil.move(files / "body.stl", files / "gone.stl")
-    assert read_job(out).body.hash == job.body.hash
+    assert UnitStudy.read(out).body.hash == job.body.hash
     # Without the body it is another study: what belonged to the body is not current any more.
     status, out = design(files)
     assert status == 0
-    assert read_job(out).body is None
+    assert UnitStudy.read(out).body is None
     assert not (out / "unit_alpha1.stl").exists()
 
 

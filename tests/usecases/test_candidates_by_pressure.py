@@ -3,6 +3,8 @@
 import attrs
 import numpy as np
 import pytest
+from mu_addon.usecases.simulate_and_place.candidates_by_pressure import CandidateSolver
+from mu_addon.usecases.simulate_and_place.candidates_in_time import evaluations
 
 from mu_addon.design.anchors import anchor_points, windows
 from mu_addon.errors import ConvergenceError
@@ -11,16 +13,14 @@ from mu_addon.placement.candidates import Candidate, Evaluation, candidate_paths
 from mu_addon.placement.deviation import centreline_deviation, deviation_of
 from mu_addon.placement.elimination import Contest
 from mu_addon.run.cache import Cache
-from mu_addon.usecases.simulate_and_place.candidates_by_pressure import CandidateSolver
-from mu_addon.usecases.simulate_and_place.candidates_in_time import evaluations
-from mu_addon.usecases.simulate_and_place.job import Job
+from mu_addon.studies.unit_ranking import UnitStudy
 from mu_addon.usecases.simulate_and_place.ranking import Ranking, mesh_change_mm
 
 from . import made_up
 from .made_up import UNIT, Waveguides
 
 PRESSURES = np.array([0.0, -10.0, 0.0, 10.0, 20.0])
-JOB = Job(
+JOB = UnitStudy(
     unit=UNIT,
     protocol=Protocol(np.arange(5.0), PRESSURES),
     mesh=made_up.MESH,

@@ -14,7 +14,6 @@ from mu_addon.meshing.settings import MeshSettings
 from mu_addon.report.motion_files import read_motion
 from mu_addon.usecases.live_bending import requests, run
 from mu_addon.usecases.live_bending.run import LiveBending
-from mu_addon.usecases.simulate_and_place.job import Job as Study
 from tests.design.kinds import cross, custom
 
 from .test_obstacles import WALL

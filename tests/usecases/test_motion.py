@@ -6,6 +6,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
+from mu_addon.usecases.simulate_and_place.candidates_by_pressure import CandidateSolver
 from PIL import Image
 from scipy.spatial import KDTree
 
@@ -33,9 +34,8 @@ from mu_addon.report.motion_files import (
 )
 from mu_addon.report.pc2 import read_pc2, write_pc2
 from mu_addon.run.cache import Cache
-from mu_addon.usecases.simulate_and_place.candidates_by_pressure import CandidateSolver
+from mu_addon.studies.unit_ranking import UnitStudy
 from mu_addon.usecases.simulate_and_place.charts import ANGLE, delta_name, write_angle, write_delta
-from mu_addon.usecases.simulate_and_place.job import Job
 from mu_addon.usecases.simulate_and_place.path_motion import keep_motion
 
 from . import made_up
@@ -43,7 +43,7 @@ from .made_up import UNIT, Waveguides
 
 PRESSURES = np.array([0.0, -10.0, 0.0, 10.0, 20.0])
 TIMES = np.arange(5.0)
-JOB = Job(
+JOB = UnitStudy(
     unit=UNIT,
     protocol=Protocol(TIMES, PRESSURES),
     mesh=made_up.MESH,

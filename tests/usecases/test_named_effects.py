@@ -7,6 +7,8 @@ import shutil
 import attrs
 import numpy as np
 import pytest
+from mu_addon.usecases.simulate_and_place.run import run_stages
+from mu_addon.usecases.simulate_and_place.study import Study
 
 from mu_addon.body.printed_mesh import mesh_printed
 from mu_addon.cli.main import main, parser
@@ -30,12 +32,10 @@ from mu_addon.meshing.settings import MeshSettings
 from mu_addon.run.context import run_to_end
 from mu_addon.run.folder import keep_inputs
 from mu_addon.run.progress import Progress
+from mu_addon.studies.unit_ranking import UnitStudy
 from mu_addon.usecases.parameter_study.plan import parse_plan
 from mu_addon.usecases.simulate_and_place.extended_unit import extend
-from mu_addon.usecases.simulate_and_place.job import Job, read_job
 from mu_addon.usecases.simulate_and_place.named_effects import STATIC, NamedEffects
-from mu_addon.usecases.simulate_and_place.run import run_stages
-from mu_addon.usecases.simulate_and_place.study import Study
 from tests.evidence import analytic
 
 from .made_up import bent
@@ -45,7 +45,7 @@ ROUGH = MeshSettings(refine=0.35)
 TIME, PRESSURE = np.arange(2.0), np.array([0.0, 2.0])
 # Three chambers, one path.
 SHORT = UNIT.evolve(count=3)
-JOB = Job(
+JOB = UnitStudy(
     unit=SHORT,
     protocol=Protocol(TIME, PRESSURE),
     mesh=ROUGH,
@@ -245,7 +245,7 @@ def test_a_job_with_effects_comes_back_from_its_folder(tmp_path):
     job = with_effects(45.0, **SIZES)
     keep_inputs(tmp_path, job.texts())
     assert "[simulate.effects.gravity]" in job.text()
-    found = read_job(tmp_path)
+    found = UnitStudy.read(tmp_path)
     assert found.effects == job.effects
     assert found.texts() == job.texts()
 
@@ -278,7 +278,7 @@ def test_effects_that_are_none_are_refused_with_place_and_remedy(tmp_path, old, 
     assert GRAVITY in found
     path.write_text(found.replace(GRAVITY, GRAVITY.replace(old, new)))
     with pytest.raises(InputError) as caught:
-        read_job(tmp_path)
+        UnitStudy.read(tmp_path)
     assert what in caught.value.what
     assert f"{path}, [simulate.effects]" in caught.value.where
     assert remedy in caught.value.remedy

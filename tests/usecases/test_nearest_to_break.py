@@ -3,21 +3,21 @@
 import attrs
 import numpy as np
 import pytest
+from mu_addon.usecases.simulate_and_place.study import Study
 
 from mu_addon.design.parameters import load_preset
 from mu_addon.fem.protocol import Protocol
 from mu_addon.meshing.settings import MeshSettings
 from mu_addon.run.context import RunContext
 from mu_addon.run.progress import Progress
-from mu_addon.usecases.simulate_and_place.job import Job
+from mu_addon.studies.unit_ranking import UnitStudy
 from mu_addon.usecases.simulate_and_place.motion_checks import doubts_of_motion
-from mu_addon.usecases.simulate_and_place.study import Study
 
 UNIT = load_preset("mu-1.0x").evolve(count=3)
 
 
 def test_a_brittle_resin_is_warned_of(tmp_path):
-    job = Job(
+    job = UnitStudy(
         unit=UNIT.evolve(elongation_at_break=0.01),
         protocol=Protocol(np.arange(2.0), np.array([0.0, 2.0])),
         mesh=MeshSettings(refine=0.35),

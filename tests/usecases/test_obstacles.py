@@ -16,8 +16,9 @@ from mu_addon.design.settings import FRICTION
 from mu_addon.design.surface import stl_bytes
 from mu_addon.errors import InputError
 from mu_addon.report.unit_pictures import _behind
+from mu_addon.studies.unit_inputs import grasp
+from mu_addon.studies.unit_ranking import UnitStudy
 from mu_addon.usecases.simulate_and_place.contact_history import DEPTH_mm
-from mu_addon.usecases.simulate_and_place.job import Job, grasp, read_job
 
 
 def block(low, high, name="block.stl"):
@@ -63,7 +64,7 @@ def test_bodies_survive_their_file(tmp_path):
 
 
 def test_one_off_the_middle_plane_asks_for_the_whole_unit():
-    job = Job(load_preset("mu-1.0x"), grasp(), stages=("design", "simulate"))
+    job = UnitStudy(load_preset("mu-1.0x"), grasp(), stages=("design", "simulate"))
     assert job.mesh_settings(job.mesh) == job.mesh
     beside = attrs.evolve(job, obstacles=[RigidBody(WALL)])
     assert beside.mesh_settings(job.mesh).fraction == "half"
@@ -98,7 +99,7 @@ def test_paths_are_ranked_beside_a_wall(files, capsys):
 def test_a_unit_that_meets_a_wall(files, capsys):
     status, out = simulate(files, "--obstacle", files / "wall.stl", "--friction", 0.3)
     assert status == 0, capsys.readouterr().out
-    job = read_job(out)
+    job = UnitStudy.read(out)
     assert [(o.friction, o.body.hash) for o in job.obstacles] == [(0.3, WALL.hash)]
 
     def rows(folder, name):

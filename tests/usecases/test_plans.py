@@ -8,7 +8,6 @@ from mu_addon.cli.main import main
 from mu_addon.design.parameters import Unit, load_preset, to_toml
 from mu_addon.meshing.settings import MeshSettings
 from mu_addon.run import progress
-from mu_addon.usecases.simulate_and_place import job as study
 from mu_addon.usecases.simulate_and_place.expected import TOUCHING, Size, plan_of, work
 
 STUDY = ["--no-self-contact", "--refine", "0.35", "--times", "3"]

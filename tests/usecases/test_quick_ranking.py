@@ -5,6 +5,9 @@ import json
 import attrs
 import numpy as np
 import pytest
+from mu_addon.usecases.simulate_and_place.candidates_by_pressure import solve_candidates
+from mu_addon.usecases.simulate_and_place.run import console_summary
+from mu_addon.usecases.simulate_and_place.study import Study
 
 from mu_addon.design.anchors import anchor_points, windows
 from mu_addon.design.parameters import load_preset
@@ -16,19 +19,18 @@ from mu_addon.placement.elimination import Contest
 from mu_addon.run.cache import Cache
 from mu_addon.run.context import run_to_end
 from mu_addon.run.progress import Progress
+from mu_addon.studies.unit_inputs import grasp
+from mu_addon.studies.unit_ranking import UnitStudy
+from mu_addon.studies.use_case import write_study
 from mu_addon.usecases.simulate_and_place import report, unit_runs
-from mu_addon.usecases.simulate_and_place.candidates_by_pressure import solve_candidates
 from mu_addon.usecases.simulate_and_place.comparison import compare
 from mu_addon.usecases.simulate_and_place.expected import plan_of
-from mu_addon.usecases.simulate_and_place.job import Job, grasp, quick, read_job, write_study
 from mu_addon.usecases.simulate_and_place.motion_checks import doubts_of_job
-from mu_addon.usecases.simulate_and_place.run import console_summary
-from mu_addon.usecases.simulate_and_place.study import Study
 
 from ..report.report_data import results
 from . import made_up
 
-FULL = Job(load_preset("mu-1.0x"), grasp(), self_contact=True)
+FULL = UnitStudy(load_preset("mu-1.0x"), grasp(), self_contact=True)
 LEFT_OUT = "under pressure alone, coarse mesh, no mesh check"
 
 
@@ -56,7 +58,7 @@ def test_its_run_is_never_taken_for_the_full_one(tmp_path):
     for job in (FULL, quick(FULL)):
         folder, job = unit_runs.place_of(tmp_path, job)
         write_study(job, folder)
-        assert read_job(folder).tables() == job.tables()
+        assert UnitStudy.read(folder).tables() == job.tables()
         (folder / "summary.json").write_text(json.dumps({"status": "complete", "J_hat_mm": {"alpha4": 0.3}}))
         runs.append(unit_runs.read_run(folder))
     full, short = runs
@@ -73,7 +75,7 @@ def test_its_deviation_is_a_bound_of_the_full_one(tmp_path, monkeypatch):
     monkeypatch.setattr(
         "mu_addon.usecases.simulate_and_place.candidate_pool.PrintedWaveguides", made_up.Waveguides
     )
-    full = Job(made_up.UNIT, grasp(), made_up.MESH, mesh_check=False, workers=1)
+    full = UnitStudy(made_up.UNIT, grasp(), made_up.MESH, mesh_check=False, workers=1)
     mesh, J = made_up.mesh(), []
     paths = candidate_paths(anchor_points(full.unit), windows(4))
     for n, job in enumerate((full, quick(full))):

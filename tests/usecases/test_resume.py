@@ -42,7 +42,6 @@ from mu_addon.usecases.live_bending import requests as live_bending
 from mu_addon.usecases.parameter_study.plan import parse_plan
 from mu_addon.usecases.resume import MODULES, resume, use_case_of
 from mu_addon.usecases.sensor import record
-from mu_addon.usecases.simulate_and_place import job as study
 
 DATA = Path(__file__).parent.parent / "data"
 UNIT = Unit(name='a "quoted" unit', chambers=Chambers(wall_mm=0.95))

@@ -8,6 +8,8 @@ import attrs
 import meshio
 import numpy as np
 import pytest
+from mu_addon.usecases.simulate_and_place.run import USE_CASE, console_summary, run_stages
+from mu_addon.usecases.simulate_and_place.study import Study
 
 from mu_addon.design.parameters import load_preset
 from mu_addon.errors import InputError
@@ -18,15 +20,13 @@ from mu_addon.meshing.settings import MeshSettings
 from mu_addon.report.motion_files import read_motion
 from mu_addon.run.context import run_to_end
 from mu_addon.run.progress import Progress
+from mu_addon.studies.unit_ranking import UnitStudy
 from mu_addon.usecases.simulate_and_place.expected import BYTES, BYTES_A_NODE, expected_nodes
-from mu_addon.usecases.simulate_and_place.job import Job, read_job
-from mu_addon.usecases.simulate_and_place.run import USE_CASE, console_summary, run_stages
-from mu_addon.usecases.simulate_and_place.study import Study
 from tests.design.kinds import custom, octet
 
 UNIT = load_preset("mu-1.0x")
 # Three chambers, one path: as many stages as six and ten have.
-JOB = Job(
+JOB = UnitStudy(
     unit=UNIT.evolve(count=3),
     protocol=Protocol(np.arange(3.0), np.array([0.0, -1.0, 2.0])),
     mesh=MeshSettings(refine=0.35),
@@ -171,7 +171,7 @@ def test_a_smaller_job_keeps_what_is_still_valid(copied, stages):
     assert set(full["gates"]) >= {"unit.stl"}
     assert (folder / "deviation.csv").is_file()
     assert not (folder / "stale").exists()
-    assert read_job(folder).stages == JOB.stages
+    assert UnitStudy.read(folder).stages == JOB.stages
     from mu_addon.usecases.simulate_and_place.report_data import write_report
 
     with run_to_end(Progress()) as context:
@@ -187,7 +187,7 @@ def test_a_smaller_job_of_another_unit_sets_all_aside(copied):
     assert not (folder / "deviation.csv").exists()
     assert (folder / "stale" / "deviation.csv").is_file()
     assert (folder / "stale" / "protocol.csv").is_file()
-    assert read_job(folder).stages == ("design",)
+    assert UnitStudy.read(folder).stages == ("design",)
 
 
 def test_figures_of_another_version_are_not_kept(copied):
@@ -259,7 +259,7 @@ def test_what_a_study_writes_is_less_than_the_room_it_asks_for(placed):
 def of_thin_walls(**given):
     """Three chambers whose walls touch by -8.5 kPa."""
     unit = load_preset("mu-1.0x")
-    return Job(
+    return UnitStudy(
         unit=attrs.evolve(unit, chambers=attrs.evolve(unit.chambers, count=3, wall_mm=0.5)),
         protocol=Protocol(np.arange(3.0), np.array([0.0, -8.5, 0.0])),
         mesh=MeshSettings(refine=0.2),
@@ -302,7 +302,7 @@ def test_friction_of_walls_that_cannot_slide_is_refused(changed, where):
     mesh = MeshSettings()
     given = {"self_contact": True, "stages": ("design", "simulate"), **changed}
     with pytest.raises(InputError) as refused:
-        Job(unit=load_preset("mu-1.0x"), protocol=JOB.protocol, mesh=mesh, **given)
+        UnitStudy(unit=load_preset("mu-1.0x"), protocol=JOB.protocol, mesh=mesh, **given)
     assert where in str(refused.value)
 
 
@@ -310,7 +310,7 @@ def test_friction_of_walls_that_cannot_slide_is_refused(changed, where):
 def test_walls_that_slide_dissipate_and_a_second_run_says_the_same(tmp_path):
     job = of_thin_walls(self_friction=0.3)
     ran(job, tmp_path)
-    assert read_job(tmp_path).self_friction == 0.3
+    assert UnitStudy.read(tmp_path).self_friction == 0.3
     first = {name: (tmp_path / name).read_bytes() for name in ("motion.csv", "self_contact.csv")}
     lost = json.loads((tmp_path / "summary.json").read_text())["self_friction"]["lost_mJ"]
     assert lost > 0
@@ -325,7 +325,7 @@ def test_walls_that_slide_dissipate_and_a_second_run_says_the_same(tmp_path):
 def test_a_printed_candidate_that_is_lost_is_solved_alone(tmp_path):
     """Each printed waveguide is kept as soon as it is solved: a killed run loses no other's."""
     unit = load_preset("mu-1.0x")
-    job = Job(
+    job = UnitStudy(
         unit=attrs.evolve(unit, chambers=attrs.evolve(unit.chambers, count=4)),
         protocol=Protocol(np.arange(2.0), np.array([0.0, 1.0])),
         mesh=MeshSettings(refine=0.4),

@@ -6,6 +6,7 @@ import sys
 import attrs
 import numpy as np
 import pytest
+from mu_addon.usecases.simulate_and_place.study_file import compose, parse, read
 
 from mu_addon.design.parameters import load_preset
 from mu_addon.errors import InputError
@@ -13,11 +14,11 @@ from mu_addon.fem.protocol import Protocol
 from mu_addon.meshing.settings import MeshSettings
 from mu_addon.placement.graph import Limits
 from mu_addon.run.folder import keep_inputs
-from mu_addon.usecases.simulate_and_place.job import Job, grasp, read_job
+from mu_addon.studies.unit_inputs import grasp
+from mu_addon.studies.unit_ranking import UnitStudy
 from mu_addon.usecases.simulate_and_place.settings import STAGES
-from mu_addon.usecases.simulate_and_place.study_file import compose, parse, read
 
-JOB = Job(
+JOB = UnitStudy(
     unit=load_preset("mu-0.75x"),
     protocol=Protocol(np.arange(3.0), np.array([0.0, -10.0, 20.0])),
     mesh=MeshSettings(refine=0.4),
@@ -40,7 +41,7 @@ def same(one, other):
 def test_a_job_comes_back_from_its_folder(tmp_path, stages):
     job = attrs.evolve(JOB, stages=stages)
     keep_inputs(tmp_path, job.texts())
-    found = read_job(tmp_path)
+    found = UnitStudy.read(tmp_path)
     assert same(found, job)
     if stages == STAGES:
         assert attrs.evolve(found, protocol=job.protocol, workers=job.workers) == job
@@ -115,7 +116,7 @@ def test_a_hostile_study_is_refused_in_words(tmp_path, text, words):
     keep_inputs(tmp_path, JOB.texts())
     (tmp_path / "study.toml").write_text(text)
     with pytest.raises(InputError, match=words):
-        read_job(tmp_path)
+        UnitStudy.read(tmp_path)
 
 
 def test_bytes_that_are_no_text_are_refused(tmp_path):
@@ -127,7 +128,7 @@ def test_bytes_that_are_no_text_are_refused(tmp_path):
 def test_a_folder_without_a_study_is_none(tmp_path):
     assert read(tmp_path) is None
     with pytest.raises(InputError, match="this folder contains no study"):
-        read_job(tmp_path)
+        UnitStudy.read(tmp_path)
 
 
 def test_what_is_composed_is_parsed(tmp_path):
@@ -136,7 +137,7 @@ def test_what_is_composed_is_parsed(tmp_path):
 
 
 def test_the_device_is_no_part_of_a_studys_inputs():
-    plain = Job(unit=load_preset("mu-1.0x"), protocol=grasp())
+    plain = UnitStudy(unit=load_preset("mu-1.0x"), protocol=grasp())
     assert attrs.evolve(plain, device="cuda:0").text() == plain.text()
     with pytest.raises(InputError, match="no device 'gpu'"):
         attrs.evolve(plain, device="gpu")
@@ -149,7 +150,7 @@ def test_the_inputs_of_a_study_are_made_without_the_solver():
         "from mu_addon.design.parameters import load_preset\n"
         "from mu_addon.fem.protocol import Protocol\n"
         "from mu_addon.usecases.simulate_and_place.job import Job\n"
-        "Job(load_preset('mu-1.0x'), Protocol(numpy.array([0.0, 1.0]), numpy.array([0.0, 20.0]))).texts()\n"
+        "UnitStudy(load_preset('mu-1.0x'), Protocol(numpy.array([0.0, 1.0]), numpy.array([0.0, 20.0]))).texts()\n"
         "print([name for name in ('warp', 'scipy', 'gmsh', 'matplotlib') if name in sys.modules])\n"
     )
     found = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=False)

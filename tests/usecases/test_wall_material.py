@@ -8,6 +8,7 @@ from pathlib import Path
 import attrs
 import numpy as np
 import pytest
+from mu_addon.usecases.simulate_and_place.study import Study
 
 from mu_addon.body.printed_mesh import mesh_printed
 from mu_addon.design.parameters import (
@@ -34,10 +35,9 @@ from mu_addon.meshing.settings import MeshSettings
 from mu_addon.report.motion_files import read_motion
 from mu_addon.run.context import RunContext
 from mu_addon.run.progress import Progress
+from mu_addon.studies.unit_ranking import UnitStudy
 from mu_addon.usecases.simulate_and_place import analysis_mesh
-from mu_addon.usecases.simulate_and_place.job import Job, read_job
 from mu_addon.usecases.simulate_and_place.motion_tables import MOTION_COLUMNS
-from mu_addon.usecases.simulate_and_place.study import Study
 
 ROOT = Path(__file__).parents[2]
 BASE = Unit(chambers=Chambers(count=3))
@@ -51,7 +51,7 @@ def unit_with_wall(**values):
 
 def job_of(unit, time, pressure, **more):
     protocol = Protocol(np.asarray(time, float), np.asarray(pressure, float))
-    return Job(unit=unit, protocol=protocol, mesh=MESH, stages=STAGES, **more)
+    return UnitStudy(unit=unit, protocol=protocol, mesh=MESH, stages=STAGES, **more)
 
 
 def opened(job, folder):
@@ -177,7 +177,7 @@ def test_a_wall_that_softens_does_not_on_its_first_loading_and_a_stopped_run_goe
     kept = sorted((study.cache.folder).glob("instant*"), key=lambda f: f.stat().st_mtime)
     for file in kept[-2:]:
         file.unlink()
-    again, _ = simulated(tmp_path / "soft", read_job(tmp_path / "soft"))
+    again, _ = simulated(tmp_path / "soft", UnitStudy.read(tmp_path / "soft"))
     np.testing.assert_array_equal(again, soft)
     fields = read_motion(tmp_path / "soft").fields["membrane"]["von_mises_kPa"]
     # The stress that bears one pressure is about the same; unsoftened, the larger strain would have more.

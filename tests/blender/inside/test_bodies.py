@@ -14,7 +14,7 @@ from mu_addon.blender.unit import object as unit_object
 from mu_addon.blender.unit.properties import to_unit
 from mu_addon.design.parameters import load_preset
 from mu_addon.design.surface import volume
-from mu_addon.usecases.simulate_and_place.job import read_job
+from mu_addon.studies.unit_ranking import UnitStudy
 
 from .acting import add, points_of, refused
 
@@ -149,7 +149,7 @@ def test_a_simulation_is_given_the_body(monkeypatch):
     monkeypatch.setattr(start_child, "start", lambda *arguments, **more: None)
     monkeypatch.setattr(start_child, "watch", lambda *arguments: None)
     assert bpy.ops.mu.simulate() == {"FINISHED"}
-    job = read_job(studies.results_folder(root))
+    job = UnitStudy.read(studies.results_folder(root))
     assert job.unit == to_unit(root.mu_unit)
     assert job.body.hash == envelope.envelope_in(root, job.unit).hash
 

@@ -17,7 +17,7 @@ from mu_addon.blender.simulate.job import SIMULATION
 from mu_addon.blender.unit import drawing
 from mu_addon.blender.unit import object as unit_object
 from mu_addon.design.surface import volume
-from mu_addon.usecases.simulate_and_place.job import read_job
+from mu_addon.studies.unit_ranking import UnitStudy
 
 from .acting import add, refused
 from .jobs import watch
@@ -42,7 +42,7 @@ def choose(root, *objects):
 def asked():
     with patch.object(start_child, "start"), patch.object(start_child, "watch"):
         assert bpy.ops.mu.simulate() == {"FINISHED"}
-    return read_job(studies.results_folder(unit_object.active_root(bpy.context)))
+    return UnitStudy.read(studies.results_folder(unit_object.active_root(bpy.context)))
 
 
 def test_what_a_simulation_is_given():
