@@ -11,7 +11,8 @@ from ..design.quantity import described
 from ..errors import InputError
 
 
-def _known(_: object, field: attrs.Attribute[Any], value: str) -> None:
+def known_device(_: object, field: attrs.Attribute[Any], value: str) -> None:
+    """Validator of an attrs field for a device; raises InputError for an unknown name."""
     if not isinstance(value, str) or not re.fullmatch(r"cpu|cuda:\d+", value):
         raise InputError(f"there is no device {value!r}", f"--{field.name}", "give cpu or cuda:0")
 
@@ -21,11 +22,6 @@ DEVICE = described(
     "cpu",
     "device of the finite elements: cpu, by factorisation, or a CUDA device, by conjugate gradients",
 )
-
-
-def device_field() -> Any:
-    """Field of a job for the device; raises InputError for an unknown name."""
-    return attrs.field(default=DEVICE.default, validator=_known)
 
 
 def require_device(device: str) -> None:

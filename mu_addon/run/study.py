@@ -447,8 +447,8 @@ class Study:
     is not resumed, and begins to use it with its first file. page: name of its report, "" without one.
 
     commands: of a study of several, its targets, each with help and example by its name, in order of need.
-    They share a folder: each has the inputs and stages of those before it, and a table of its own in the file of
-    inputs; what a further one made stays valid. file: the name of that file, if it is not the study's;
+    They share a folder: each has the inputs and stages of those before it, and a table of its own in the
+    file of inputs; what a further one made stays valid. file: the name of that file, if it is not the study's;
     version: the number of its format; header: its first line.
     """
 

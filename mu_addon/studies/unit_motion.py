@@ -13,7 +13,7 @@ from .. import design, fem, meshing
 from ..design.quantity import described
 from ..design.settings import QUALITY, USUAL_RESIN
 from ..errors import InputError
-from ..fem.device import DEVICE
+from ..fem.device import DEVICE, known_device
 from ..meshing.settings import SELF_CONTACT
 from ..run.parts import File, Part, Sentence, Warn, csv, recorded
 from ..run.study import Input, Members, Over, Study, Tell, given, intermediate, section, setting, stage
@@ -133,7 +133,11 @@ class UnitMotion(Study):
         converter=SELF_CONTACT.checked,
     )
     self_friction: float = setting(SELF_FRICTION, metavar="MU", group=SOLVER, target="simulate")
-    device: str = setting(DEVICE, decides=False, metavar="cpu|cuda:0", group=SOLVER, target="simulate")
+    device: str = given(
+        Input("setting", (DEVICE,), decides=False, metavar="cpu|cuda:0", group=SOLVER, target="simulate"),
+        default=DEVICE.default,
+        validator=known_device,
+    )
     workers: int = setting(WORKERS, decides=False, metavar="N", target="simulate")
 
     def __attrs_post_init__(self) -> None:
@@ -392,10 +396,10 @@ class UnitMotion(Study):
             yield recorded("body", box)
         if "simulate" not in self.stages:
             return
-        asked: dict[str, Any] = {"times": self.times, "mesh": attrs.asdict(self.mesh)}
-        if "place" in self.stages:
-            asked["stations"] = self.stations  # type: ignore[attr-defined]
-        yield recorded("study", asked | (self.effects.tables if self.effects else {}))
+        stations = {"stations": self.stations} if "place" in self.stages else {}  # type: ignore[attr-defined]
+        asked = {"times": self.times, "mesh": attrs.asdict(self.mesh), **stations, **self.effects.tables}
+        for name, value in asked.items():
+            yield recorded(f"study.{name}", value)
         for words in core.doubts_of_protocol(self.driven, self.samples):
             yield Warn(words)
 
@@ -457,7 +461,7 @@ class UnitMotion(Study):
         shown = ", ".join(f"{round(a, 1) + 0.0:+.1f} deg at {p:g} kPa" for p, a in (ends[0], ends[-1]))
         yield Sentence(f"angle: {shown}", terminal=True, page=False)
         if not (states or instants).complete:  # type: ignore[union-attr]
-            yield core.states_file(meshed, reached)
+            yield core.states_file(meshed, [(t, state) for t, _, state in reached.instants])
         yield from core.motion_parts(self, meshed, reached)
 
     def reached(
@@ -471,16 +475,13 @@ class UnitMotion(Study):
     @section("motion", "Motion of the unit")
     def finished(
         self,
-        meshed: meshing.Mesh,
         motion: fem.Trajectory,
         motion_tables: core.MotionTables,
         fields: core.StateFields,
-        states: Members | None = None,
         instants: core.InTime | None = None,
     ) -> Iterator[Part]:
         """The whole motion: files for display, stretch, contact of the unit with itself, doubts."""
-        reached = self.reached(meshed, states, instants)
-        yield from core.finished_motion_parts(self, reached, motion, motion_tables, fields, instants)
+        yield from core.finished_motion_parts(self, motion, motion_tables, fields, instants)
 
     @section("contact", "Contact with obstacles")
     def met(self, instants: core.InTime) -> Iterator[Part]:

@@ -7,8 +7,6 @@ import shutil
 import attrs
 import numpy as np
 import pytest
-from mu_addon.usecases.simulate_and_place.run import run_stages
-from mu_addon.usecases.simulate_and_place.study import Study
 
 from mu_addon.body.printed_mesh import mesh_printed
 from mu_addon.cli.main import main, parser
@@ -38,6 +36,7 @@ from mu_addon.usecases.simulate_and_place.extended_unit import extend
 from mu_addon.usecases.simulate_and_place.named_effects import STATIC, NamedEffects
 from tests.evidence import analytic
 
+from . import unit_runs
 from .made_up import bent
 
 UNIT = load_preset("mu-1.0x")
@@ -88,17 +87,13 @@ def mesh():
 
 def moved(job, mesh):
     """Model A of a job, and its angles by pressure."""
-    found = simulate(Equilibrium(job.model(mesh), job.materials(mesh), job.newton), TIME, PRESSURE)
+    found = simulate(Equilibrium(job.model(mesh), job.materials(mesh), job.mechanics.newton), TIME, PRESSURE)
     return found, np.array([bending_angle_deg(mesh, s.u) for s in found.solved])
 
 
 def ran(job, folder):
-    """Its summary; the report, which takes longest, is left out."""
-    messages = []
-    with run_to_end(Progress([messages.append])) as context:
-        run_stages(Study.open(job, folder, context))
-    assert context.status == 0, messages[-1]
-    return json.loads((folder / "summary.json").read_text())
+    """Summary of its run."""
+    return unit_runs.ran(job, folder)[0]
 
 
 def test_every_static_effect_of_the_evidence_can_be_simulated():
@@ -123,7 +118,7 @@ def test_a_simulation_is_what_the_evidence_computes_of_the_same_effect(name, mes
     u, data = bent(mesh, 1.0), found.parameters(materials)
     np.testing.assert_array_equal(found.residual(u, 0.01, data) if load is None else found.load,
                                   model.residual(u, 0.01, data) if load is None else load)  # fmt: skip
-    assert job.newton == body.newton(effect)
+    assert job.mechanics.newton == body.newton(effect)
     plain = JOB.model(mesh)
     same = materials.hash() == JOB.materials(mesh).hash() and load is None
     assert not same or not np.array_equal(plain.residual(u, 0.01, data), found.residual(u, 0.01, data))
@@ -132,7 +127,7 @@ def test_a_simulation_is_what_the_evidence_computes_of_the_same_effect(name, mes
 def test_weight_alone_bends_a_unit_that_lies_and_none_that_hangs(mesh):
     def sag(turn):
         job = with_effects(turn, gravity=1300.0)
-        state = Equilibrium(job.model(mesh), job.materials(mesh), job.newton).at_zero_pressure()
+        state = Equilibrium(job.model(mesh), job.materials(mesh), job.mechanics.newton).at_zero_pressure()
         return bending_angle_deg(mesh, state.u)
 
     hanging, lying, turned = map(sag, (0.0, 90.0, -90.0))
@@ -427,17 +422,16 @@ def test_in_time_the_unit_stands_where_the_evidence_has_it(name):
     effect = "viscoelasticity" if name.startswith("relaxing") else name.partition(" of ")[0]
     values = {f"{effect}.{p}": v for p, v in IN_TIME[name].items()}
     expected = UnitPressure([analytic.response()], [record]).effective_kPa(record, values)
-    found = in_time(name).samples[1]
+    found = in_time(name).samples.pressure_kPa
     np.testing.assert_allclose(found, expected[::10], atol=2e-9 if name != "leak" else 1e-9)
 
 
 def test_a_wall_that_relaxes_creeps_on_and_comes_back(tmp_path):
     """A step of pressure held: the bending goes from that of the modulus at once to that after long."""
     job = attrs.evolve(in_time("viscoelasticity"), protocol=MILD, times=7, stages=("design", "simulate"))
-    with run_to_end(Progress()) as context:
-        run_stages(Study(job, tmp_path, context))
+    summary = ran(job, tmp_path)
     rows = np.genfromtxt(tmp_path / "motion.csv", delimiter=",", names=True)
-    assert rows["time_s"].tolist() == job.samples[0].tolist() == [0, 3, 6, 9, 12, 15, 18]
+    assert rows["time_s"].tolist() == job.samples.time_s.tolist() == [0, 3, 6, 9, 12, 15, 18]
     np.testing.assert_allclose(rows["pressure_kPa"], [0, 2, 2, 2, 0, 0, 0])
     assert (np.diff(rows["angle_deg"][1:4]) > 0).all()
     # After long it stands where the unit without memory does at 2 kPa.
@@ -445,7 +439,7 @@ def test_a_wall_that_relaxes_creeps_on_and_comes_back(tmp_path):
     assert 0.0 < rows["angle_deg"][4] < 0.3 * rows["angle_deg"][3]
     assert rows["angle_deg"][-1] < 0.1 * rows["angle_deg"][3]
     # The table has six digits.
-    assert context.summary["angle_deg"]["2"] == pytest.approx(rows["angle_deg"][1], rel=1e-5)
+    assert summary["angle_deg"]["2"] == pytest.approx(rows["angle_deg"][1], rel=1e-5)
     shown = np.load(tmp_path / "motion/model_a.npz")
     np.testing.assert_allclose(shown["pressure_kPa"], rows["pressure_kPa"])
 
@@ -453,8 +447,7 @@ def test_a_wall_that_relaxes_creeps_on_and_comes_back(tmp_path):
 @pytest.mark.nightly("test_sensor_paths_are_ranked_in_the_unit_that_has_the_effect")
 def test_place_goes_on_where_the_unit_relaxes(tmp_path):
     job = attrs.evolve(in_time("viscoelasticity"), protocol=MILD, times=7)
-    with run_to_end(Progress()) as context:
-        run_stages(Study(job, tmp_path, context))
+    ran(job, tmp_path)
     delta = np.load(tmp_path / "delta.npz")
     assert delta["pressure_kPa"].max() == 2.0
     worst = delta["delta_mm"].max(axis=(0, 2))

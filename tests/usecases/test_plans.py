@@ -1,14 +1,13 @@
 """Plans of runs: the stages that a command tells at its start are those that come, and its share grows."""
 
 import attrs
-import numpy as np
 import pytest
 
 from mu_addon.cli.main import main
 from mu_addon.design.parameters import Unit, load_preset, to_toml
-from mu_addon.meshing.settings import MeshSettings
 from mu_addon.run import progress
-from mu_addon.usecases.simulate_and_place.expected import TOUCHING, Size, plan_of, work
+from mu_addon.studies.unit_ranking import UnitStudy
+from mu_addon.usecases.simulate_and_place.expected import TOUCHING, Size, work
 
 STUDY = ["--no-self-contact", "--refine", "0.35", "--times", "3"]
 SMALL = load_preset("mu-0.75x").evolve(count=3)
@@ -52,9 +51,10 @@ def test_a_command_does_what_it_planned(monkeypatch, tmp_path, words):
 
 @pytest.mark.parametrize(("apart", "suction"), [(False, 1.0), (True, TOUCHING)])
 def test_suction_takes_longest_where_walls_touch(apart, suction):
-    job = study.Job(Unit(), study.grasp(), MeshSettings(), self_contact=apart)
-    assert [work(job, [p]) for p in (-20.0, 0.0, 40.0)] == [suction, 0.0, 1.0]
-    assert work(job, np.unique(job.samples[1])) == suction + max(suction / 4.0, 1.0) + 4
+    job = UnitStudy(unit=Unit(), self_contact=apart)
+    size = Size.of(job)
+    assert [work(size, [p]) for p in (-20.0, 0.0, 40.0)] == [suction, 0.0, 1.0]
+    assert work(size, job.samples.distinct_kPa) == suction + max(suction / 4.0, 1.0) + 4
 
 
 def test_a_plan_follows_what_is_asked_for():
@@ -73,6 +73,6 @@ def test_a_plan_follows_what_is_asked_for():
     # Three of ten paths are solved in suction, which is most of the work.
     left_out = 0.7 * (TOUCHING * 1.25) / (TOUCHING * 1.25 + 4)
     assert base.factor("candidates") == pytest.approx(1.0 - left_out)
-    job = study.Job(Unit(), study.grasp(), MeshSettings(), self_contact=True)
+    job = UnitStudy(unit=Unit(), self_contact=True)
     every = attrs.evolve(job, all_paths=True)
-    assert dict(plan_of(job))["candidates"] < dict(plan_of(every))["candidates"]
+    assert job.expected()["candidates"] < every.expected()["candidates"]

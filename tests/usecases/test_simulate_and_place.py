@@ -8,21 +8,22 @@ import attrs
 import meshio
 import numpy as np
 import pytest
-from mu_addon.usecases.simulate_and_place.run import USE_CASE, console_summary, run_stages
-from mu_addon.usecases.simulate_and_place.study import Study
 
 from mu_addon.design.parameters import load_preset
 from mu_addon.errors import InputError
 from mu_addon.fem.protocol import Protocol
-from mu_addon.files import write_npz
+from mu_addon.files import plain, write_npz
 from mu_addon.meshing.mesh import MEMBRANE
 from mu_addon.meshing.settings import MeshSettings
 from mu_addon.report.motion_files import read_motion
-from mu_addon.run.context import run_to_end
+from mu_addon.run.context import RunContext
 from mu_addon.run.progress import Progress
 from mu_addon.studies.unit_ranking import UnitStudy
+from mu_addon.studies.use_case import use_case
 from mu_addon.usecases.simulate_and_place.expected import BYTES, BYTES_A_NODE, expected_nodes
 from tests.design.kinds import custom, octet
+
+from . import unit_runs
 
 UNIT = load_preset("mu-1.0x")
 # Three chambers, one path: as many stages as six and ten have.
@@ -38,12 +39,8 @@ JOB = UnitStudy(
 
 
 def ran(job, folder):
-    """Its summary; the report, which takes longest, is left out."""
-    messages = []
-    with run_to_end(Progress([messages.append])) as context:
-        run_stages(Study.open(job, folder, context))
-    assert context.status == 0, messages[-1]
-    return json.loads((folder / "summary.json").read_text())
+    """Summary of its run."""
+    return unit_runs.ran(job, folder)[0]
 
 
 def read_rows(path):
@@ -83,12 +80,14 @@ def test_its_motion_is_a_table_over_time(placed):
     assert (moved.cell_data["von_mises_kPa"][0][in_wall] > 0.0).all()
 
 
-def test_its_solid_is_said_in_mm_ml_and_g(placed):
-    _, summary = placed
-    found = summary["solid"]
+def test_its_solid_is_said_in_mm_ml_and_g(tmp_path):
+    context = RunContext(Progress([]))
+    work = use_case("design").start(attrs.evolve(JOB, stages=("design",)), tmp_path, context)
+    found = json.loads(json.dumps(plain(context.summary["solid"])))
+    context.unlock()
     assert found["size_mm"][2] == pytest.approx(JOB.unit.dimensions.height, abs=10.0)
     assert found["g"] == pytest.approx(1.01 * found["ml"])
-    (line,) = console_summary({"solid": found})
+    (line,) = work.lines
     assert line.startswith("solid: ")
     assert line.endswith(f"{found['ml']:.1f} ml, {found['g']:.1f} g of Elastic 50A V1")
 
@@ -116,7 +115,6 @@ COSTS = pytest.mark.nightly("test_a_change_costs_only_what_depends_on_it")
     [
         (lambda job: job, 1, 2),
         pytest.param(lambda job: attrs.evolve(job, stations=12), 1, 2, marks=COSTS),
-        # Other pressures: a state's last digits depend on those before it.
         (lambda job: attrs.evolve(job, protocol=Protocol(np.arange(2.0), np.array([0.0, 1.5]))), 1, 4),
         pytest.param(lambda job: with_resin(job, membrane_modulus_kPa=2000.0), 1, 4, marks=COSTS),
         # A wall that remembers has no beams.
@@ -129,30 +127,13 @@ COSTS = pytest.mark.nightly("test_a_change_costs_only_what_depends_on_it")
 def test_a_change_costs_only_what_depends_on_it(copied, change, mesh, states):
     """So many entries of the cache afterwards, two states a motion; what was there is not written again."""
     folder, _ = copied
-    before = {kind: times(folder, kind) for kind in ("mesh", "state")}
+    before = {kind: times(folder, kind) for kind in ("meshed", "states")}
     job = attrs.evolve(change(JOB), stages=("design", "simulate"))
     ran(job, folder)
-    for kind, count in (("mesh", mesh), ("state", states)):
+    for kind, count in (("meshed", mesh), ("states", states)):
         after = times(folder, kind)
         assert len(after) == count
         assert before[kind].items() <= after.items()
-
-
-def test_a_report_of_the_same_figures_is_not_drawn_again(tmp_path):
-    job = attrs.evolve(JOB, stages=("design",), unit=JOB.unit.evolve(count=3))
-
-    def drawn(wanted):
-        """When the report was written, after a run of a job."""
-        with run_to_end(Progress()) as context:
-            USE_CASE.start(wanted, tmp_path, context)
-        assert context.status == 0
-        return (tmp_path / "report.html").stat().st_mtime_ns
-
-    first = drawn(job)
-    assert drawn(job) == first
-    (tmp_path / "report.html").unlink()
-    assert drawn(job) > first
-    assert drawn(with_wall(job, 1.0)) > first
 
 
 @pytest.mark.parametrize("stages", [("design",), ("design", "simulate")])
@@ -172,11 +153,6 @@ def test_a_smaller_job_keeps_what_is_still_valid(copied, stages):
     assert (folder / "deviation.csv").is_file()
     assert not (folder / "stale").exists()
     assert UnitStudy.read(folder).stages == JOB.stages
-    from mu_addon.usecases.simulate_and_place.report_data import write_report
-
-    with run_to_end(Progress()) as context:
-        write_report(Study.open(study, folder, context))
-    assert context.status == 0
     assert (folder / "report.html").read_text() == "of the full study"
 
 
@@ -219,7 +195,7 @@ DAMAGES = ("truncated", "flipped", "emptied", "other names", "other shapes")
 
 def test_damaged_states_are_solved_again_to_the_same_digits(placed, copied):
     folder, _ = copied
-    rng, kept = np.random.default_rng(0), [*times(folder, "mesh"), *times(folder, "state")]
+    rng, kept = np.random.default_rng(0), [*times(folder, "meshed"), *times(folder, "states")]
     for number, name in enumerate(sorted(kept)):
         damaged(folder / "cache" / name, DAMAGES[number], rng)
     ran(attrs.evolve(JOB, stages=("design", "simulate")), folder)
@@ -229,10 +205,7 @@ def test_damaged_states_are_solved_again_to_the_same_digits(placed, copied):
 def test_too_little_room_is_told_before_any_work(tmp_path, monkeypatch):
     usage = shutil.disk_usage(tmp_path)
     monkeypatch.setattr(shutil, "disk_usage", lambda _: usage._replace(free=20_000_000))
-    messages = []
-    with run_to_end(Progress([messages.append])) as context:
-        Study.open(JOB, tmp_path / "out", context)
-    assert context.status == 5
+    _, messages = unit_runs.ran(JOB, tmp_path / "out", status=5)
     assert "20 MB are free" in messages[-1]["what"]
     assert "free some space" in messages[-1]["what_to_do"]
     assert not (tmp_path / "out" / "unit.stl").exists()
@@ -334,8 +307,8 @@ def test_a_printed_candidate_that_is_lost_is_solved_alone(tmp_path):
         workers=1,
     )
     found = ran(job, tmp_path)["J_hat_mm"]
-    kept = sorted((tmp_path / "cache").glob("sweep-*"))
-    assert len(kept) == len(found["printed"]) == 3
+    kept = sorted((tmp_path / "cache").glob("candidates-*"))
+    assert len(kept) == len(found) == 3
     kept[1].unlink()
     before = {path.name: path.stat().st_mtime_ns for path in kept[::2]}
     assert ran(job, tmp_path)["J_hat_mm"] == found
@@ -346,6 +319,6 @@ def test_a_printed_candidate_that_is_lost_is_solved_alone(tmp_path):
 def test_a_lattice_that_holds_no_waveguide_is_refused_before_anything_is_made(tmp_path):
     mesh = MeshSettings(refine=0.5)
     job = attrs.evolve(JOB, unit=JOB.unit.evolve(**custom(octet()), seats=False), mesh=mesh)
-    with run_to_end(Progress([])) as context, pytest.raises(InputError, match="no node at the cell's centre"):
-        run_stages(Study.open(job, tmp_path, context))
+    _, messages = unit_runs.ran(job, tmp_path, status=2)
+    assert "no node at the cell's centre" in messages[-1]["what"]
     assert not (tmp_path / "unit.stl").exists()

@@ -1,14 +1,11 @@
 """A wall with a law of its own: limits of what it remembers, through a study's own job."""
 
-import json
 import re
-from functools import partial
 from pathlib import Path
 
 import attrs
 import numpy as np
 import pytest
-from mu_addon.usecases.simulate_and_place.study import Study
 
 from mu_addon.body.printed_mesh import mesh_printed
 from mu_addon.design.parameters import (
@@ -33,11 +30,11 @@ from mu_addon.materials.library import load_material, material_text, parse_mater
 from mu_addon.measured import read_folder
 from mu_addon.meshing.settings import MeshSettings
 from mu_addon.report.motion_files import read_motion
-from mu_addon.run.context import RunContext
-from mu_addon.run.progress import Progress
 from mu_addon.studies.unit_ranking import UnitStudy
-from mu_addon.usecases.simulate_and_place import analysis_mesh
+from mu_addon.usecases.simulate_and_place import motion
 from mu_addon.usecases.simulate_and_place.motion_tables import MOTION_COLUMNS
+
+from . import unit_runs
 
 ROOT = Path(__file__).parents[2]
 BASE = Unit(chambers=Chambers(count=3))
@@ -54,24 +51,20 @@ def job_of(unit, time, pressure, **more):
     return UnitStudy(unit=unit, protocol=protocol, mesh=MESH, stages=STAGES, **more)
 
 
-def opened(job, folder):
-    progress = Progress()
-    return Study.open(job, folder, RunContext(progress))
-
-
 @pytest.fixture
 def solid_struts(monkeypatch):
     """Every wall is simulated with the struts that one with memory has: beams have none."""
-    monkeypatch.setattr(analysis_mesh, "mesh_printed", partial(mesh_printed, solid=True))
+
+    def solid(*given, **more):
+        return mesh_printed(*given, **{**more, "solid": True})
+
+    monkeypatch.setattr(motion, "mesh_printed", solid)
 
 
 def simulated(folder, job):
     """Angles (k,) in degrees of a study of motion, at the samples of its protocol."""
-    study = opened(job, folder)
-    study.make_mesh()
-    trajectory = study.simulate()
-    study.context.unlock()
-    return trajectory.of_time(np.array([study.bending_angle_deg(s.u) for s in trajectory.solved])), study
+    work, _ = unit_runs.executed(job, folder)
+    return work.results.value(("motion", None)).angle_deg, work
 
 
 @pytest.fixture(scope="module")
@@ -174,7 +167,7 @@ def test_a_wall_that_softens_does_not_on_its_first_loading_and_a_stopped_run_goe
     assert rows[0] == ",".join(MOTION_COLUMNS)
     assert len(rows) == 6
     # A stop loses the last two instants; what the wall remembered at the third is there.
-    kept = sorted((study.cache.folder).glob("instant*"), key=lambda f: f.stat().st_mtime)
+    kept = sorted((study.results.cache.folder).glob("instant*"), key=lambda f: f.stat().st_mtime)
     for file in kept[-2:]:
         file.unlink()
     again, _ = simulated(tmp_path / "soft", UnitStudy.read(tmp_path / "soft"))
@@ -198,8 +191,6 @@ def test_friction_in_the_wall_leaves_a_loop_whatever_the_rate(tmp_path, solid_st
 
 @pytest.mark.nightly("test_a_wall_that_softens_does_not_on_its_first_loading_and_a_stopped_run_goes_on")
 def test_sensor_paths_are_ranked_in_a_wall_that_remembers(tmp_path):
-    from mu_addon.usecases.simulate_and_place.run import run_stages
-
     unit = unit_with_wall(law="prony", prony_g1=0.3, prony_tau1_s=1.0)
     job = attrs.evolve(
         job_of(unit, [0, 1, 2], [0, 1.5, 0], times=3),
@@ -207,12 +198,9 @@ def test_sensor_paths_are_ranked_in_a_wall_that_remembers(tmp_path):
         mesh_check=False,
         workers=1,
     )
-    study = opened(job, tmp_path / "out")
-    run_stages(study)
-    chosen = study.context.summary["chosen"]
-    assert study.context.summary["J_hat_mm"][chosen] > 0
-    assert any("whose state depends on its history" in words for words in study.warnings)
-    assert json.dumps(study.context.summary["J_hat_mm"])
+    summary, _ = unit_runs.ran(job, tmp_path / "out")
+    assert summary["J_hat_mm"][summary["chosen"]] > 0
+    assert any("whose state depends on its history" in words for words in summary["warnings"])
 
 
 def test_jobs_that_know_no_such_wall_refuse_it():

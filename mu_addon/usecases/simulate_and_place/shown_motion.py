@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -106,20 +106,21 @@ def _of_extremes(study: Any, mesh: Mesh, states: list[State]) -> list[tuple[str,
     return [("", picture) for picture in motion(mesh, texts, beside=study.obstacles)]
 
 
-def states_file(mesh: Mesh, reached: Reached, fields: StateFields | None = None, motion: Any = None) -> File:
-    """model_a.pvd: the states for ParaView."""
-    of = {} if fields is None else dict(zip(map(id, motion.solved), fields.of_elements, strict=True))
-    instants = [(t, s) for t, _, s in reached.instants]
+def states_file(
+    mesh: Mesh, instants: Sequence[tuple[float, State]], fields: StateFields | None = None
+) -> File:
+    """model_a.pvd: states with their times in s for ParaView; fields: of each state, in order."""
+    every = {id(s): s for _, s in instants}
+    of = {} if fields is None else dict(zip(every, fields.of_elements, strict=True))
 
     def write(path: Path) -> None:
         write_trajectory(path, mesh, instants, lambda state: of.get(id(state), {}))
 
-    return File("model_a.pvd", write, of=(fields is None, *(s.u for _, s in instants)))
+    return File("model_a.pvd", write, of=(fields is None, *(s.u for s in every.values())))
 
 
 def finished_motion_parts(
     study: Any,
-    reached: Reached,
     motion: Trajectory,
     tables: MotionTables,
     fields: StateFields,
@@ -142,7 +143,11 @@ def finished_motion_parts(
         )
 
     yield File(FOLDER, write, of=content)
-    yield states_file(mesh, reached, fields, motion)
+    of = dict(zip(map(id, states), fields.of_elements, strict=True))
+    instants_shown = list(zip(motion.time_s.tolist(), motion.states, strict=True))
+    order = dict.fromkeys(id(state) for state in motion.states)
+    shown = attrs.evolve(fields, of_elements=tuple(of[one] for one in order))
+    yield states_file(mesh, instants_shown, shown)
     yield csv("stretch.csv", STRETCH_COLUMNS, tables.stretch)
     most = nearest_to_break(tables.stretch)
     yield recorded("nearest_to_break", most)
