@@ -14,7 +14,6 @@ from mu_addon.fem.trajectory import Trajectory
 from mu_addon.fem.unit_materials import materials_of
 from mu_addon.meshing.settings import MeshSettings
 from mu_addon.report.motion_files import write_model_a
-from mu_addon.studies.unit_inputs import grasp
 from mu_addon.studies.unit_ranking import UnitStudy
 from mu_addon.studies.use_case import write_study
 from mu_addon.usecases.simulate_and_place import unit_runs
@@ -52,7 +51,7 @@ def write_bent_run(home, at_s, wall_mm=0.9, more=1.0, full=False, ranked=True):
     """
     chambers = attrs.evolve(UNIT.chambers, wall_mm=wall_mm)
     mesh = MeshSettings(refine=1.0 if full else 0.5)
-    job = UnitStudy(attrs.evolve(UNIT, chambers=chambers), grasp(), mesh=mesh)
+    job = UnitStudy(unit=attrs.evolve(UNIT, chambers=chambers), mesh=mesh)
     if not ranked:
         job = attrs.evolve(job, stages=("design", "simulate"))
     folder, job = unit_runs.place_of(home, job)

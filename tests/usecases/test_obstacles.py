@@ -16,7 +16,6 @@ from mu_addon.design.settings import FRICTION
 from mu_addon.design.surface import stl_bytes
 from mu_addon.errors import InputError
 from mu_addon.report.unit_pictures import _behind
-from mu_addon.studies.unit_inputs import grasp
 from mu_addon.studies.unit_ranking import UnitStudy
 from mu_addon.usecases.simulate_and_place.contact_history import DEPTH_mm
 
@@ -64,12 +63,12 @@ def test_bodies_survive_their_file(tmp_path):
 
 
 def test_one_off_the_middle_plane_asks_for_the_whole_unit():
-    job = UnitStudy(load_preset("mu-1.0x"), grasp(), stages=("design", "simulate"))
-    assert job.mesh_settings(job.mesh) == job.mesh
+    job = UnitStudy(unit=load_preset("mu-1.0x"), stages=("design", "simulate"))
+    assert job.meshed_as == job.mesh
     beside = attrs.evolve(job, obstacles=[RigidBody(WALL)])
-    assert beside.mesh_settings(job.mesh).fraction == "half"
+    assert beside.meshed_as.fraction == "half"
     off = attrs.evolve(job, obstacles=[RigidBody(block((1, 40, 0), (20, 50, 30)))])
-    assert off.mesh_settings(job.mesh).fraction == "full"
+    assert off.meshed_as.fraction == "full"
     with pytest.raises(InputError, match="does not support obstacles"):
         attrs.evolve(beside, stages=("design", "simulate", "place"), paths="graph")
 

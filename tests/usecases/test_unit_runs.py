@@ -10,13 +10,12 @@ from mu_addon.design.parameters import load_preset
 from mu_addon.errors import InputError
 from mu_addon.meshing.settings import MeshSettings
 from mu_addon.run.lock import FolderLock, InUseError
-from mu_addon.studies.unit_inputs import grasp
 from mu_addon.studies.unit_ranking import UnitStudy
 from mu_addon.studies.use_case import write_study
 from mu_addon.usecases.simulate_and_place import unit_runs
 from mu_addon.usecases.simulate_and_place.comparison import compare
 
-FULL = UnitStudy(load_preset("mu-0.75x"), grasp(), mesh=MeshSettings())
+FULL = UnitStudy(unit=load_preset("mu-0.75x"), mesh=MeshSettings())
 COARSE = attrs.evolve(FULL, mesh=MeshSettings(refine=0.5))
 MOTION = attrs.evolve(FULL, stages=("design", "simulate"))
 SHORT = {"status": "complete", "angle_deg": {"-20": -3.0, "40": 6.0}, "seconds": {"Model A": 40.0}}

@@ -130,7 +130,7 @@ def test_a_wall_that_relaxes_is_stiff_at_once_and_the_units_own_after_long(tmp_p
     relaxing = attrs.evolve(base, wall=Wall(law="prony", prony_g1=g, prony_tau1_s=tau))
     # Pressed for 40 tau; and within a millionth of one.
     found, study = simulated(tmp_path / "held", job_of(relaxing, [0, 40.0], [0, p], times=2))
-    assert study.job.in_time
+    assert study.study.in_time
     jump, _ = simulated(tmp_path / "jump", job_of(relaxing, [0, 1e-6], [0, p], times=2))
     elastic, _ = simulated(tmp_path / "elastic", job_of(base, [0, 1], [0, p], times=2))
     mu, kappa = NeoHooke.parameters(base.material.membrane_modulus_MPa, base.material.membrane_poisson)[0]

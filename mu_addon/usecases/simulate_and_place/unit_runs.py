@@ -233,7 +233,8 @@ def ordered(found: Iterable[Run]) -> list[Run]:
 
 def read_run(folder: Path) -> Run:
     """The run in a folder. Raises InputError and OSError where it cannot be read."""
-    tables, _, _ = _kind().read_tables(folder / NAME)
+    found, _, _ = _kind().read_tables(folder / NAME)
+    tables = {target: dict(table.values) for target, table in found.items()}
     unit = read_unit(folder / "unit.toml")
     asked = tables.get("simulate", {})
     body = ""

@@ -15,7 +15,6 @@ import pytest
 from mu_addon.design.parameters import load_preset
 from mu_addon.meshing.settings import MeshSettings
 from mu_addon.placement.graph import Limits
-from mu_addon.studies.unit_inputs import grasp
 from mu_addon.studies.unit_ranking import UnitStudy
 
 from ...made_once import made_once
@@ -113,7 +112,7 @@ def placed(tmp_path_factory, with_light):
     """A finished study, whose motion is made up; whoever writes into it takes `study`."""
 
     def make(folder):
-        place(with_light(folder), UnitStudy(load_preset("mu-0.75x"), grasp(), workers=1, **PLACE))
+        place(with_light(folder), UnitStudy(unit=load_preset("mu-0.75x"), workers=1, **PLACE))
 
     return made_once(tmp_path_factory, "placed", make)
 
