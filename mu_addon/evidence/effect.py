@@ -4,13 +4,12 @@ from __future__ import annotations
 
 import math
 import re
-from collections.abc import Sequence
 
 import attrs
 
 from ..errors import InputError
-from ..measured import Experiment
-from .effects import DECLARED
+from .effects import DECLARED, laws_of
+from .effects.declaration import Data
 from .parameter import OF as OF
 from .parameter import Parameter as Parameter
 from .parameter import factor as factor
@@ -115,12 +114,22 @@ class Effect:
         return tuple(found)
 
 
-def laws(kind: str, experiments: Sequence[Experiment]) -> tuple[Effect, ...]:
-    """Laws, for a kind of experiment, of the effects that act by their own files."""
+def offered(data: Data) -> tuple[Effect, ...]:
+    """Laws of every effect that experiments of a kind may show, bounded by them."""
     return tuple(
-        Effect(name, parameters, (kind,))
-        for name, declared in DECLARED.items()
-        for parameters in declared.laws(kind, experiments)
+        Effect(
+            name,
+            law.parameters,
+            (data.kind,),
+            law.mechanism or DECLARED[name].mechanism,
+            **({"reveals": law.reveals} if law.reveals else {}),
+            refines=law.refines,
+            tried=law.tried,
+        )
+        for name, laws in laws_of(data.kind).items()
+        for template in laws
+        if template is not DECLARED[name].differs
+        for law in template.offered(template, data)
     )
 
 

@@ -9,10 +9,11 @@ from benchmarks.evidence.second_code.recording import write
 from benchmarks.evidence.second_code.sets import Order, made
 from mu_addon.evidence.acceptance import of_the_law
 from mu_addon.evidence.diagnosis import diagnose
+from mu_addon.evidence.effects.mullins_softening import turns
+from mu_addon.evidence.effects.viscoelasticity import spread_lag
 from mu_addon.evidence.found_causes import LAW
+from mu_addon.evidence.lags import first_order_lag
 from mu_addon.evidence.prediction.coupon import CouponStress
-from mu_addon.evidence.prediction.effective_pressure import first_order_lag, spread_lag
-from mu_addon.evidence.prediction.specimen import turns
 from mu_addon.evidence.simulator import Composite
 from mu_addon.measured import read_folder
 from tests.evidence import bench
@@ -39,9 +40,8 @@ def test_a_lag_on_an_uneven_clock_is_the_solution_from_sample_to_sample(time_s):
 def test_times_that_spread_over_no_decade_are_one_time():
     t = np.linspace(0.0, 30.0, 200)
     p = np.sin(t)
-    values = {"viscoelasticity.middle_s": 3.0, "viscoelasticity.decades": 0.0}
-    np.testing.assert_allclose(spread_lag(t, p, values), first_order_lag(t, p, 3.0), atol=1e-12)
-    wide = spread_lag(t, p, {**values, "viscoelasticity.decades": 2.0})
+    np.testing.assert_allclose(spread_lag(t, p, 3.0, 0.0), first_order_lag(t, p, 3.0), atol=1e-12)
+    wide = spread_lag(t, p, 3.0, 2.0)
     each = [first_order_lag(t, p, 3.0 * 10.0**k) for k in np.linspace(-1.0, 1.0, 7)]
     np.testing.assert_allclose(wide, np.mean(each, axis=0), atol=1e-12)
 

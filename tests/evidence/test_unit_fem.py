@@ -11,9 +11,10 @@ from scipy.interpolate import CubicSpline
 
 from mu_addon.errors import ConvergenceError, InputError
 from mu_addon.evidence import unit_fem
+from mu_addon.evidence.effects import STATIC as EFFECTS
 from mu_addon.evidence.markers import attached, material_points, nearest
 from mu_addon.evidence.prediction.unit_pressure import UnitPressure
-from mu_addon.evidence.unit_effects import EFFECTS, Body, down
+from mu_addon.evidence.unit_body import Body, down
 from mu_addon.evidence.unit_fem import (
     Result,
     Run,

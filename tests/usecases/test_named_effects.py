@@ -16,9 +16,10 @@ from mu_addon.design.body import body_of
 from mu_addon.design.parameters import load_preset, to_toml
 from mu_addon.design.rigid_body import RigidBody
 from mu_addon.errors import InputError
+from mu_addon.evidence.effects import STATIC as EFFECTS
 from mu_addon.evidence.extended import ExtendedModel, Fitted
 from mu_addon.evidence.prediction.unit_pressure import UnitPressure
-from mu_addon.evidence.unit_effects import EFFECTS, Body
+from mu_addon.evidence.unit_body import Body
 from mu_addon.fem.bending_angle import bending_angle_deg
 from mu_addon.fem.clogged import CloggedModel
 from mu_addon.fem.equilibrium import Equilibrium

@@ -17,9 +17,9 @@ from ...errors import InputError
 from ...evidence.diagnosis import diagnose
 from ...evidence.drive import reading_noise
 from ...evidence.effect import readable
+from ...evidence.effects.mullins_softening import REFERENCE
 from ...evidence.extended import ExtendedModel, Fitted, extended_model, stacked
 from ...evidence.prediction import lattice_compression, unit_pressure
-from ...evidence.prediction.effective_pressure import REFERENCE
 from ...evidence.readings import STAYS, dwell, quantum
 from ...evidence.simulator import Composite, Simulator, bends
 from ...evidence.simulators import BASE, DESIGNS, EFFECTS, SHARES, SIZES, simulations_plan, simulators_of
@@ -198,12 +198,14 @@ def _shapes(
 
 def with_reference(model: ExtendedModel, simulators: Mapping[str, Simulator]) -> ExtendedModel:
     """The model with the reference pressure of the energy of a unit's Mullins softening."""
-    effect, _, name = REFERENCE.partition(".")
+    effect = "mullins_softening"
     unit = simulators.get(unit_pressure.KIND)
     if effect not in model.effects or not isinstance(unit, unit_pressure.UnitPressure):
         return model
     stated = Fitted(unit.reference_kPa, 0.0, math.nan, math.nan, "kPa")
-    return attrs.evolve(model, effects={**model.effects, effect: {**model.effects[effect], name: stated}})
+    return attrs.evolve(
+        model, effects={**model.effects, effect: {**model.effects[effect], REFERENCE: stated}}
+    )
 
 
 def _known_before(job: Job, simulator: Composite) -> list[str]:

@@ -20,9 +20,9 @@ from ...evidence.effect import (
     bare,
     readable,
 )
+from ...evidence.effects.marker_slip import Recordings
 from ...evidence.found_causes import Cause
 from ...evidence.pooled import sizes_of
-from ...evidence.prediction.marker_slip import Recordings
 from ...evidence.prediction.unit_pressure import MODULUS
 from ...evidence.record import KNOWN
 from ...evidence.scatter import STATED, noise_limit
