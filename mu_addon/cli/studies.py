@@ -35,7 +35,7 @@ def _add_unit(command: argparse.ArgumentParser, one: Any) -> None:
 
 
 def _unit(options: argparse.Namespace, context: RunContext, one: Any) -> Any:
-    if hasattr(options, "model"):
+    if one.needed and not one.default:
         return modelled_unit(options, context)
     from ..design.parameters import load_preset
 
@@ -91,7 +91,7 @@ def _plan(options: argparse.Namespace, context: RunContext, one: Any) -> Any:
 
 
 def _add_model(command: argparse.ArgumentParser, one: Any) -> None:
-    add_model(command)
+    add_model(command, one.text)
 
 
 def _model(options: argparse.Namespace, context: RunContext, one: Any) -> Any:

@@ -12,6 +12,7 @@ STUDIES = {
     "chain": "Chain",
     "check": "Check",
     "design-experiments": "DesignExperiments",
+    "diagnose": "Diagnose",
     "export": "Export",
     "fit-material": "FitMaterial",
     "grip": "Grip",

@@ -390,22 +390,24 @@ class NumbersInput(Input):
 
 @attrs.frozen
 class ModelInput(Input):
-    """An extended model of a diagnosis, in a file of its own, or None."""
+    """An extended model of a diagnosis, in a file of its own, or None; text: says in a command which."""
 
     kind: str = "model"
+    file: str = MODEL
+    text: str = ""
 
     def write(self, name: str, value: evidence.ExtendedModel | None) -> Written:
         """The file's name, and its text."""
-        return Written() if value is None else Written({name: MODEL}, files={MODEL: value.text()})
+        return Written() if value is None else Written({name: self.file}, files={self.file: value.text()})
 
     def read(self, name: str, found: Found) -> evidence.ExtendedModel | None:
         """The model of the folder, if it has one; raises InputError."""
         named = found.keys.pop(name, None)
-        return None if named is None else evidence.load_model(found.path.parent / MODEL)
+        return None if named is None else evidence.load_model(found.path.parent / self.file)
 
     def file_names(self, name: str) -> tuple[str, ...]:
         """Its file."""
-        return (MODEL,)
+        return (self.file,)
 
 
 _SCHEDULER = described(

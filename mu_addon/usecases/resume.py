@@ -22,7 +22,6 @@ MODULES = {
     "study.toml": ".simulate_and_place.run",
     "prepare.toml": ".prepare",
     "live.toml": ".live_bending.run",
-    "diagnose.toml": ".diagnose.run",
     "record.toml": ".sensor.record",
     "graph.toml": ".graph.run",
 }

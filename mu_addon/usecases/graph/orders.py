@@ -12,10 +12,7 @@ from ...design.rigid_body import require_beside
 from ...errors import InputError
 from ...graph.definition import Call, Outputs
 from ...graph.evaluation import Finished, Order
-from ...measured import Measured
 from ...meshing.settings import MeshSettings
-from ..diagnose.job import Job as DiagnoseJob
-from ..diagnose.run import USE_CASE as DIAGNOSE
 from ..simulate_and_place.extended_unit import read_extended
 from ..simulate_and_place.job import Job, grasp, protocol_of
 from ..simulate_and_place.named_effects import NamedEffects
@@ -137,11 +134,3 @@ def solid_order(call: Call) -> Order:
     unit, given, path = solid_of(call)
     job = Job(unit, grasp(), stages=("design",), quality=given.quality, body=given.body, path=path)
     return Order(STUDY, job)
-
-
-def diagnose_order(call: Call) -> Order:
-    """Run that diagnoses measured data."""
-    design, measured = call.inputs["unit"], call.inputs["data"]
-    assert isinstance(measured, Measured)
-    unit = None if design is None else design.unit
-    return Order(DIAGNOSE, DiagnoseJob(measured, unit, self_contact=call.settings["self_contact"]))
