@@ -24,7 +24,7 @@ from ..run.pool import each
 from ..run.processes import cores
 from .drawn import Designs, Surface, require_enough
 from .effect import Parameter
-from .effects import STATIC
+from .effects import ON_UNITS
 from .markers import Marker, attached
 from .prediction import blocked_force, pressure_step, unit_pose
 from .prediction.flat_obstacle import CONTACT, NEAREST, ObstacleResponse
@@ -58,8 +58,8 @@ MESH_ERROR = "mesh_error"
 # Of the way from the mesh of changes to the model's, how much farther the answer may lie: a third of it by
 # the order of the elements. In suction, where walls close, it is another at each pressure.
 FARTHER, UNEVEN = 0.5, 0.25
-KNOWN = tuple(name for name, e in STATIC.items() if e.of != HELD)
-OF_HELD = tuple(name for name, e in STATIC.items() if e.of == HELD)
+KNOWN = tuple(name for name, e in ON_UNITS.items() if e.of != HELD)
+OF_HELD = tuple(name for name, e in ON_UNITS.items() if e.of == HELD)
 # A second code with another mesh and another volumetric law, the same unit: its angles are ours at pressures
 # changed by 0.047 of the largest one times the square of their share of it.
 DISCREPANCY = 0.04
@@ -100,7 +100,7 @@ class UnitSettings:
 
     def further(self, names: Collection[str]) -> UnitSettings | None:
         """With some effects also at the remaining sizes; None where all are."""
-        more = frozenset({*STATIC}.intersection(names))
+        more = frozenset({*ON_UNITS}.intersection(names))
         if self.whole is None or more <= self.whole:
             return None
         return attrs.evolve(self, whole=self.whole | more)
@@ -351,7 +351,7 @@ class _Plan:
     def names(self, settings: UnitSettings) -> list[str]:
         """Effects that have runs, walls apart."""
         without = MESH_ERROR if self.changes else ""
-        own = [n for n in settings.effects if STATIC[n].of != WALL and n != without]
+        own = [n for n in settings.effects if ON_UNITS[n].of != WALL and n != without]
         return [*own, *(OF_HELD if self.held else ())]
 
     def case(
@@ -408,7 +408,7 @@ class _Plan:
         yield self.base_case
         yield from self.of_designs()
         for name in sorted(set(self.names(settings)), key=lambda n: (n != MESH_ERROR, n)):
-            effect = STATIC[name]
+            effect = ON_UNITS[name]
             for orientation in self.orientations if effect.has_gravity else ((0.0, X),):
                 for size in self.sizes(name):
                     if size != effect.parameter.null:
@@ -416,7 +416,7 @@ class _Plan:
 
     def sizes(self, name: str) -> tuple[float, ...]:
         """Sizes of an effect that are run, its null among them."""
-        effect = STATIC[name]
+        effect = ON_UNITS[name]
         if self.whole is None or name in self.whole:
             return effect.sizes_at(self.enlarged)
         return effect.first_at(self.enlarged)
@@ -541,7 +541,7 @@ class _Plan:
         kept: Any,
     ) -> Variant | None:
         """The response to an effect at the sizes that could be computed; None where that is one alone."""
-        effect = STATIC[name]
+        effect = ON_UNITS[name]
         null, grown = effect.parameter.null, self.enlarged**effect.length
         sizes: list[float] = []
         missed: list[float] = []

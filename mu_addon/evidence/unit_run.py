@@ -21,7 +21,7 @@ from ..fem.trajectory import branches
 from ..fem.unit_materials import self_contact_of
 from ..measured.pose import X
 from ..run.cache import Cache
-from .effects import STATIC
+from .effects import ON_UNITS
 from .effects.contact import with_flat_obstacle
 from .markers import material_points
 from .unit_body import Body, UnitEffect
@@ -70,7 +70,7 @@ class Run:
         """
         if not self.effect:
             return self.body, None
-        effect = STATIC[self.effect]
+        effect = ON_UNITS[self.effect]
         body = effect.body(self.body, self.size) if effect.body else self.body
         if effect.has_gravity:
             body = body.whole
@@ -82,7 +82,7 @@ class Run:
             body, effect = self.changed
         except InputError:
             # No such body: its failure is kept, too.
-            body, effect = self.body, STATIC[self.effect]
+            body, effect = self.body, ON_UNITS[self.effect]
         parts = [REVISION, body.unit.hash(), attrs.astuple(body.mesh), self.pressures_kPa, self.points]
         parts += [body.newton(effect)]
         if body.drawn:

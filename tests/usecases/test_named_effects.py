@@ -257,13 +257,13 @@ GRAVITY = "[simulate.effects.gravity]\ndensity_kg_m3 = 1300.0\n"
 @pytest.mark.parametrize(
     ("old", "new", "what", "remedy"),
     [
-        ("gravity", "magnetism", "no effect 'magnetism' is known", "known: gravity, strain"),
-        ("gravity", "gravitty", "did you mean 'gravity'", "known: gravity"),
+        ("gravity", "magnetism", "no effect 'magnetism' is known", "known: anisotropy, clogged"),
+        ("gravity", "gravitty", "did you mean 'gravity'", "known: anisotropy"),
         (
             "gravity",
             "pressure_gain",
             "not an effect that a simulation of the unit can contain",
-            "known: gravity",
+            "known: anisotropy",
         ),
         ("density", "mass", "gravity has density_kg_m3, not mass_kg_m3", "write density_kg_m3"),
         ("1300.0", "-5.0", "density_kg_m3 = -5.0 is out of bounds", "give 0 to 4000 kg/m3"),

@@ -8,7 +8,7 @@ from importlib import import_module
 from pkgutil import iter_modules
 from typing import Any
 
-from .declaration import Declaration, Law, Setting
+from .declaration import BENCH, Declaration, Law, Setting
 
 DECLARED: dict[str, Declaration] = {
     m.name: import_module(f".{m.name}", __name__).EFFECT
@@ -23,17 +23,22 @@ def having(trait: str) -> frozenset[str]:
 
 
 CAMERA, GRIPS, MEMORY, LEVEL, MODULI = map(having, ("camera", "grips", "memory", "level", "modulus"))
-STATIC = {name: e.unit for name, e in DECLARED.items() if e.unit}
-"""Static effects of the finite-element model of a unit."""
+ON_UNITS = {name: e.unit for name, e in DECLARED.items() if e.unit}
+"""Static effects of the finite-element model of a unit, with those of walls and of a held tip."""
+STATIC = {name: e for name, e in ON_UNITS.items() if not e.of}
+"""Those of a unit wherever it is."""
 LOADS = frozenset(name for name, e in STATIC.items() if e.load)
 """Those that are dead loads, which bend a stiffer unit less in proportion."""
 
 
 @cache
 def laws_of(kind: str) -> dict[str, tuple[Law, ...]]:
-    """Laws for a kind of experiment by the name of their effect; what an instrument does comes last."""
+    """Laws for a kind of experiment by the name of their effect, those of a bench last.
+
+    Of explanations that do equally well the first is taken: a specimen's before its bench's.
+    """
     found = {}
-    for name, e in sorted(DECLARED.items(), key=lambda item: item[1].instrument):
+    for name, e in sorted(DECLARED.items(), key=lambda item: item[1].of == BENCH):
         every = (*e.laws, *([e.differs] if e.differs else []))
         if own := tuple(law for law in every if kind in law.kinds):
             found[name] = own

@@ -12,7 +12,7 @@ from ...errors import InputError
 from ...measured import Experiment
 from ...measured.pose import down
 from ..effect import Effect, offered
-from ..effects import STATIC, Acting, places
+from ..effects import ON_UNITS, Acting, places
 from ..effects.declaration import Data, Setting
 from ..lags import first_order_lag, lag_weights
 from ..load_cell import ZERO_SHARE
@@ -51,7 +51,7 @@ class BlockedForce:
         here = data.own
         static = [e for e in self._driven.effects if e.name in responses[0].variants]
         # How far the stand gives way is known by runs of the tip at other gaps.
-        self._gap = next((e.name for e in static if STATIC[e.name].of == HELD), "")
+        self._gap = next((e.name for e in static if ON_UNITS[e.name].of == HELD), "")
         self._most, self._largest_kPa = data.largest(FORCE), data.largest("pressure_kPa")
         laws = (e for e in offered(data) if self._gap or "stand" not in places(KIND, e.name))
         self.effects = (*(Effect(e.name, e.parameters, (KIND,)) for e in static), *laws)
