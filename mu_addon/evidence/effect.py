@@ -9,15 +9,15 @@ import attrs
 
 from ..errors import InputError
 from .effects import DECLARED, laws_of
-from .effects.declaration import Data
+from .effects.declaration import Data, Law
 from .parameter import OF as OF
 from .parameter import Parameter as Parameter
 from .parameter import factor as factor
 
 # Another modulus of one specimen: an effect of specimens alone, see `owned`.
 BATCH = "batch_variation"
-# A mistyped height, a change between two tests, a factor of fast tests: of some experiments alone.
-GEOMETRY, STEP, HEATING = "geometry_as_typed", "step_change", "self_heating"
+# A mistyped height, a change between two tests: of some experiments alone.
+GEOMETRY, STEP = "geometry_as_typed", "step_change"
 # Struts printed thicker or thinner than drawn, unlike another specimen's: see `owned`.
 THICKNESS = "strut_thickness"
 # A factor on the force of some tests; of which causes, `scaled_by` tells.
@@ -117,20 +117,18 @@ class Effect:
 def offered(data: Data) -> tuple[Effect, ...]:
     """Laws of every effect that experiments of a kind may show, bounded by them."""
     return tuple(
-        Effect(
-            name,
-            law.parameters,
-            (data.kind,),
-            law.mechanism or DECLARED[name].mechanism,
-            **({"reveals": law.reveals} if law.reveals else {}),
-            refines=law.refines,
-            tried=law.tried,
-        )
+        _effect(name, law, data.kind)
         for name, laws in laws_of(data.kind).items()
         for template in laws
         if template is not DECLARED[name].differs
         for law in template.offered(template, data)
     )
+
+
+def _effect(name: str, law: Law, kind: str) -> Effect:
+    words = law.mechanism or DECLARED[name].mechanism
+    found = Effect(name, law.parameters, (kind,), words, refines=law.refines, tried=law.tried)
+    return attrs.evolve(found, reveals=law.reveals) if law.reveals else found
 
 
 def readable(name: str) -> str:

@@ -14,7 +14,6 @@ from mu_addon.evidence.effects.viscoelasticity import spread_lag
 from mu_addon.evidence.found_causes import LAW
 from mu_addon.evidence.lags import first_order_lag
 from mu_addon.evidence.prediction.coupon import CouponStress
-from mu_addon.evidence.simulator import Composite
 from mu_addon.measured import read_folder
 from tests.evidence import bench
 
@@ -98,23 +97,6 @@ def test_softening_knows_the_largest_strain_though_no_sample_was_there():
     rows = slice(0, None, 50)
     coarse, whole = (CouponStress([e]).predict(e, values)[0] for e in map(made_of, (rows, slice(None))))
     np.testing.assert_allclose(coarse, whole[rows], rtol=1e-6, atol=1e-9)
-
-
-def test_a_law_that_refines_is_offered_apart():
-    e = bench.experiment(
-        "coupon", {"time_s": np.arange(9.0), "strain": np.linspace(0, 0.1, 9), "stress_kPa": np.ones(9)}
-    )
-    simulator = Composite({"coupon": CouponStress([e])})
-    assert {r.name for r in simulator.refinements} == {
-        "force_drift",
-        "frame_compliance",
-        "force_lag",
-        "rate_independent_hysteresis",
-        "viscoelasticity",
-        "mullins_softening",
-        "strain_stiffening",
-    }
-    assert not any(effect.refines for effect in simulator.effects)
 
 
 @pytest.mark.parametrize(

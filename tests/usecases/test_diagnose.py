@@ -3,7 +3,6 @@
 import csv
 import json
 import re
-import shutil
 from pathlib import Path
 from types import SimpleNamespace
 
@@ -106,25 +105,6 @@ def test_the_report_says_it_in_a_sentence_and_needs_no_server(overcured):
     assert html.count("<figure") >= 6 + 3
     assert not re.search(r"(src|href)=\"(?!data:|#)", html)
     assert "<script" not in html
-
-
-def test_equal_data_leave_equal_bytes(overcured, tmp_path):
-    folder, out, _, messages = overcured
-    stages = [m["stage"] for m in messages if m["type"] == "progress" and m["state"] == "end"]
-    assert stages == ["verdict", "report"]
-    run(folder, tmp_path)
-    for name in ("verdict.json", "model.toml", "residuals.csv", "report.html", "diagnose.toml"):
-        assert (tmp_path / name).read_bytes() == (out / name).read_bytes()
-
-
-def test_other_data_set_the_old_results_aside(overcured, tmp_path):
-    _, out, _, _ = overcured
-    shutil.copytree(out, tmp_path / "out")
-    other = weighed_blocks(tmp_path / "data", 0.0)
-    context, _ = run(other, tmp_path / "out")
-    assert context.status == 0
-    assert (tmp_path / "out" / "stale" / "verdict.json").read_bytes() == (out / "verdict.json").read_bytes()
-    assert json.loads((tmp_path / "out" / "verdict.json").read_text())["verdict"] == "none"
 
 
 def test_nothing_is_named_where_nothing_is_wrong(tmp_path):

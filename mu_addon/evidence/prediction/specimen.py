@@ -138,7 +138,8 @@ def _borne(acting: Acting, strain: Array, law: Law) -> Array:
     frame = acting.along(None, "frame") if acting.setting.strain_per_kPa_mm_N else None
     if frame is None:
         return stress
-    return _shared(stress, strain, *frame, seated, lambda e: _remembering(acting, seated, e))
+    give, taken = frame
+    return _shared(stress, strain, give, taken, seated, lambda e: _remembering(acting, seated, e))
 
 
 def _shared(

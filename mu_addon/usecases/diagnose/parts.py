@@ -143,7 +143,8 @@ def causes(found: JudgedData) -> Iterator[Part]:
             "These effects are the best fit and not a verdict: the remaining residual has structure, so "
             "their parameters may compensate for another cause."
         )
-    rows, best = [], []
+    rows: list[list[str]] = []
+    best: list[int] = []
     for cause in named:
         first = [readable(cause.effect.name), cause.effect.mechanism]
         p_value = _p_value(cause.p_value)
