@@ -210,7 +210,7 @@ class Diagnose(Study):
         return data.experiments
 
     @derived
-    def told(self, data: measured.Measured) -> tuple[measured.Remark, ...]:
+    def remarked(self, data: measured.Measured) -> tuple[measured.Remark, ...]:
         """Remarks of the reader of the data."""
         return data.remarks
 
@@ -236,7 +236,7 @@ class Diagnose(Study):
     def look(
         self, experiments: Experiments, base: Simulated, before: Mapping[str, float], tell: Tell
     ) -> dict[str, str]:
-        """Early verdict on a unit by its base simulation alone, told while others run.
+        """Early verdict on a unit by its base simulation alone, shown while others run.
 
         It includes instruments and effects in time, but no weight, walls or print: those need further
         simulations, which take most of a verdict's time.
@@ -297,14 +297,14 @@ class Diagnose(Study):
 
     @intermediate()
     def found(
-        self, experiments: Experiments, told: tuple[measured.Remark, ...],
+        self, experiments: Experiments, remarked: tuple[measured.Remark, ...],
         unit: design.Unit | None, known: evidence.ExtendedModel | None, first: Judging,
         whole: Judging | None = None, shaped: Shaped | None = None,
     ) -> JudgedData:  # fmt: skip
         """The verdict with its model and the remarks on it."""
         from ..usecases.diagnose.judged_data import judged_data
 
-        return judged_data(experiments, told, unit, known, whole or first, shaped)
+        return judged_data(experiments, remarked, unit, known, whole or first, shaped)
 
     # What it shows.
 
@@ -319,9 +319,9 @@ class Diagnose(Study):
         return subtitle(self.data.experiments, self.self_contact)
 
     @section()
-    def remarks(self, told: tuple[measured.Remark, ...]) -> Iterator[Part]:
+    def remarks(self, remarked: tuple[measured.Remark, ...]) -> Iterator[Part]:
         """Remarks of the reader of the data."""
-        for remark in told:
+        for remark in remarked:
             yield Warn(remark.what, remark.where, remark.remedy, repeated=False)
 
     @section()

@@ -156,9 +156,9 @@ def test_a_unit_is_judged_by_its_angle_and_markers(request, tmp_path, gauge_kPa)
     first = summary["first_look"]
     assert "clogged" not in first["headline"]
     stages = [m["stage"] for m in messages if m["type"] == "progress" and m["state"] == "start"]
-    (told,) = (i for i, stage in enumerate(stages) if stage.startswith("first look"))
-    assert first["headline"] in stages[told]
-    assert stages.index("unit") < told < stages.index("unit with each effect")
+    assert stages[:3] == ["unit", "first look", "unit with each effect"]
+    (finding,) = (m["what"] for m in messages if m["type"] == "finding")
+    assert first["headline"] in finding
     remarks = [r.partition(" was averaged")[0] for r in summary["remarks"] if "was averaged" in r]
     # What is predicted has noise as well, of which nothing is taken.
     assert len(remarks) == (gauge_kPa > 0)

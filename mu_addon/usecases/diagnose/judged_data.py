@@ -149,7 +149,7 @@ def first_look(
     headline, words = sentence(verdict)
     # What nothing explains says so itself.
     kind = "" if headline.startswith(verdict.kind) else f"{verdict.kind}, "
-    tell(1.0, f"without weight, walls and print: {kind}{headline}")
+    tell.progress.finding(f"first look, without weight, walls and print: {kind}{headline}")
     return {"verdict": verdict.kind, "headline": headline, "sentence": words}
 
 

@@ -49,7 +49,7 @@ def answer(found: JudgedData) -> Iterator[Part]:
         yield Sentence(f"shape: {found.shape}", terminal=True, page=False)
     yield from _sizes(found)
     gain = verdict.gain
-    if verdict.selection.causes:
+    if verdict.names:
         for errors, of in ((gain.fit, "fitted data"), (gain.held_out, "held-out data")):
             if errors:
                 drop = f"{errors.before:.3g} -> {errors.after:.3g} {errors.unit}"
