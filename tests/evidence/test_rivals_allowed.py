@@ -137,6 +137,9 @@ def test_corners_of_a_few_rows_are_no_noise_of_the_drive():
     assert again is None
 
 
+@pytest.mark.nightly(
+    "tests/evidence/test_laws.py::test_two_effects_that_pass_for_slow_noise_one_by_one_are_found_together"
+)
 def test_two_causes_of_which_one_alternates_by_test_are_both_found():
     """Neither predicts a test left out alone: the search ended at the first."""
     rng = np.random.default_rng(8)

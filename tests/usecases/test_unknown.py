@@ -152,6 +152,7 @@ def test_the_shipped_file_of_the_papers_shape_is_of_the_preset():
     assert {u.chambers.wall_mm for u in designs.units} >= {0.4, 0.9}
 
 
+@pytest.mark.nightly("test_a_shape_that_nobody_measured_is_found_and_no_cause_named")
 def test_no_cause_is_named_while_dimensions_are_unknown(tmp_path, closed_form):
     folder = written(tmp_path / "data")
     for path in folder.glob("*_0.75x.csv"):
