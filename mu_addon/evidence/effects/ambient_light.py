@@ -1,12 +1,9 @@
 """Ambient light."""
 
-from collections.abc import Mapping
-
-from ..parameter import Parameter
-from .declaration import BENCH, Array, Declaration, Law, Setting
+from .declaration import BENCH, Array, Declaration, Law, Parameter, Setting, Values
 
 
-def _changing(voltage: Array, v: Mapping[str, float], at: Setting) -> Array:
+def _changing(voltage: Array, v: Values, at: Setting) -> Array:
     hours = (at.time_s - at.time_s[0]) / 3600.0
     return voltage + v["at_first_V"] * (1.0 + v["per_hour"] * hours)
 

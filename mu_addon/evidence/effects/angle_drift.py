@@ -1,13 +1,11 @@
 """Angle drift."""
 
-from collections.abc import Mapping
-
 import attrs
 import numpy as np
 
 from ..camera import View
 from ..drift import drift, drift_laws
-from .declaration import BENCH, CYCLED, Data, Declaration, Setting
+from .declaration import BENCH, CYCLED, Data, Declaration, Setting, Values
 
 # Largest rotation of a stable camera during a record.
 TURN_deg = 20.0
@@ -17,7 +15,7 @@ def _most(data: Data) -> float:
     return TURN_deg
 
 
-def _turned(view: View, v: Mapping[str, float], at: Setting) -> View:
+def _turned(view: View, v: Values, at: Setting) -> View:
     return attrs.evolve(view, turned=view.turned + np.radians(drift(at.time_s, v)))
 
 

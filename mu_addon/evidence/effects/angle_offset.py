@@ -1,14 +1,11 @@
 """Angle offset."""
 
-from collections.abc import Mapping
-
 import numpy as np
 
-from ..parameter import Parameter
-from .declaration import BENCH, CYCLED, Array, Declaration, Law, Setting
+from .declaration import BENCH, CYCLED, Array, Declaration, Law, Parameter, Setting, Values
 
 
-def _read(y: Array, v: Mapping[str, float], at: Setting) -> Array:
+def _read(y: Array, v: Values, at: Setting) -> Array:
     angles = np.array([channel == "angle_deg" for channel in at.channels])
     return y + v["offset_deg"] * angles[:, None]
 

@@ -2,25 +2,23 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from typing import TYPE_CHECKING
 
 import attrs
 import numpy as np
 
-from ..parameter import Parameter
 from ..unit_body import UnitEffect
 
 if TYPE_CHECKING:
     from ...fem.materials import Materials
     from ...meshing.mesh import Mesh
-from .declaration import IN_MODEL, MACHINE, Declaration, Law, Setting
+from .declaration import IN_MODEL, MACHINE, Declaration, Law, Parameter, Setting, Values
 
 # One for x and y alike: with one each, an axis left out could not be predicted from the others.
 IN_PLANE = Parameter("in_plane", "", -0.9, 9.0, 0.0, (-0.3, 0.5), "modulus along x and y over z's, less 1")
 
 
-def _across(stiffness: float, v: Mapping[str, float], at: Setting) -> float:
+def _across(stiffness: float, v: Values, at: Setting) -> float:
     return stiffness * (1 + v["in_plane"]) if at.experiment.axis in ("x", "y") else stiffness
 
 

@@ -1,7 +1,6 @@
 """Batch variation."""
 
-from ..parameter import factor
-from .declaration import Declaration, Law
+from .declaration import Declaration, Law, factor
 
 EFFECT = Declaration(
     mechanism="the modulus of one specimen, or its section as typed, differs from that of the others",

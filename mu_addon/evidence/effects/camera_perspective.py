@@ -1,13 +1,10 @@
 """Camera perspective."""
 
-from collections.abc import Mapping
-
 import attrs
 import numpy as np
 
 from ..camera import View
-from ..parameter import Parameter
-from .declaration import BENCH, CYCLED, Declaration, Law, Setting
+from .declaration import BENCH, CYCLED, Declaration, Law, Parameter, Setting, Values
 
 # Assumed distance of a camera, in unit lengths.
 AWAY = 3.0
@@ -35,12 +32,12 @@ WHOLE = (
 )
 
 
-def _oblique(view: View, v: Mapping[str, float], at: Setting) -> View:
+def _oblique(view: View, v: Values, at: Setting) -> View:
     way = np.array([v.get("across", 0.0), v.get("along", 0.0)])
     return attrs.evolve(view, farther=way)
 
 
-def _pinhole(view: View, v: Mapping[str, float], at: Setting) -> View:
+def _pinhole(view: View, v: Values, at: Setting) -> View:
     """Of a pinhole turned by an angle v toward a direction n: cos v along n, and sin v over its distance."""
     off, way = np.radians(v["view_deg"]), np.radians(v["farther_deg"])
     n = np.array([np.cos(way), np.sin(way)])

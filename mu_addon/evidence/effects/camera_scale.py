@@ -2,13 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-
 import attrs
 
 from ..camera import View
-from ..parameter import Parameter
-from .declaration import BENCH, CYCLED, Data, Declaration, Law, Setting
+from .declaration import BENCH, CYCLED, Data, Declaration, Law, Parameter, Setting, Values
 
 EXCESS = Parameter("excess", "", -0.1, 0.1, 0.0, (0.01,), "a ruler nearer or farther than the unit")
 
@@ -17,7 +14,7 @@ def _of_markers(law: Law, data: Data) -> tuple[Law, ...]:
     return (law,) if any(c.startswith("marker") for c in data.channels) else ()
 
 
-def _grown(view: View, v: Mapping[str, float], at: Setting) -> View:
+def _grown(view: View, v: Values, at: Setting) -> View:
     return attrs.evolve(view, excess=v["excess"])
 
 

@@ -1,12 +1,9 @@
 """Camera tilt."""
 
-from collections.abc import Mapping
-
 import attrs
 
 from ..camera import View
-from ..parameter import Parameter
-from .declaration import BENCH, CYCLED, Declaration, Law, Setting
+from .declaration import BENCH, CYCLED, Declaration, Law, Parameter, Setting, Values
 
 FORESHORTENING = Parameter(
     "foreshortening",
@@ -19,7 +16,7 @@ FORESHORTENING = Parameter(
 )
 
 
-def _squeezed(view: View, v: Mapping[str, float], at: Setting) -> View:
+def _squeezed(view: View, v: Values, at: Setting) -> View:
     short = v["foreshortening"]
     return attrs.evolve(view, across=1.0 - max(short, 0.0), along=1.0 + min(short, 0.0))
 

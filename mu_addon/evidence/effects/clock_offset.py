@@ -1,19 +1,16 @@
 """Clock offset."""
 
-from collections.abc import Mapping
-
 import numpy as np
 
 from ..lags import smooth_at
-from ..parameter import Parameter
-from .declaration import BENCH, DRIVEN, Array, Declaration, Law, Setting
+from .declaration import BENCH, DRIVEN, Array, Declaration, Law, Parameter, Setting, Values
 
 
-def _driven(p: Array, v: Mapping[str, float], at: Setting) -> Array:
+def _driven(p: Array, v: Values, at: Setting) -> Array:
     return np.interp(at.time_s - v["offset_s"], at.time_s, p)
 
 
-def _bent(angle: Array, v: Mapping[str, float], at: Setting) -> Array:
+def _bent(angle: Array, v: Values, at: Setting) -> Array:
     return smooth_at(at.time_s, at.experiment["angle_deg"], v["offset_s"])
 
 

@@ -5,13 +5,12 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 from ...errors import InputError
-from ..parameter import Parameter
 from ..unit_body import Body, UnitEffect
 
 if TYPE_CHECKING:
     from ...fem.model import Model
     from ...meshing.mesh import Mesh
-from .declaration import Declaration
+from .declaration import Declaration, Parameter
 
 
 def _clogged(body: Body, mesh: Mesh, share_lost: float) -> Model:

@@ -9,13 +9,12 @@ import attrs
 
 from ...fem.newton_settings import CONTACT_NEWTON
 from ...meshing.settings import CELL_MM
-from ..parameter import Parameter
 from ..unit_body import WALL, Body, UnitEffect
 
 if TYPE_CHECKING:
     from ...fem.model import Model
     from ...meshing.mesh import Mesh
-from .declaration import BENCH, CYCLED, Data, Declaration, Law
+from .declaration import BENCH, CYCLED, Data, Declaration, Law, Parameter
 
 # A wall's contact pressure is some kPa; there the gap is off by this much at 1.0x.
 OBSTACLE_MPa, OBSTACLE_mm = 0.005, 0.02

@@ -26,7 +26,8 @@ import attrs
 import numpy as np
 
 from ...measured import Experiment
-from ..parameter import Parameter
+from ..parameter import Parameter as Parameter
+from ..parameter import factor as factor
 
 if TYPE_CHECKING:
     from ..unit_body import UnitEffect
@@ -58,7 +59,9 @@ class Setting(SimpleNamespace):
     """
 
 
-Action = Callable[[Any, Mapping[str, float], Setting], Any]
+Values = Mapping[str, float]
+"""Of a law's parameters, by their names."""
+Action = Callable[[Any, Values, Setting], Any]
 """The changed quantity, of that without the effect, values by name of the law's parameters, and a setting."""
 
 

@@ -1,21 +1,19 @@
 """Fatigue drift."""
 
 import math
-from collections.abc import Mapping
 
 import numpy as np
 
 from ..lags import cycles
-from ..parameter import Parameter
-from .declaration import CYCLED, MACHINE, Array, Declaration, Law, Setting
+from .declaration import CYCLED, MACHINE, Array, Declaration, Law, Parameter, Setting, Values
 
 
-def _cycled(modulus: Array, v: Mapping[str, float], at: Setting) -> Array:
+def _cycled(modulus: Array, v: Values, at: Setting) -> Array:
     done = at.past.cycles + cycles(at.experiment["pressure_kPa"])
     return modulus * (1.0 - v["per_decade"] * np.log10(1.0 + done))
 
 
-def _tested(stiffness: float, v: Mapping[str, float], at: Setting) -> float:
+def _tested(stiffness: float, v: Values, at: Setting) -> float:
     return stiffness * (1 - v["per_decade"] * math.log10(1 + at.past.tests))
 
 

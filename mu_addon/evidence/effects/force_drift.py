@@ -1,17 +1,15 @@
 """Force drift."""
 
-from collections.abc import Mapping
-
 from ..drift import drift, drift_laws
 from ..load_cell import ZERO_SHARE, largest_N
-from .declaration import BENCH, CELL, Array, Data, Declaration, Setting
+from .declaration import BENCH, CELL, Array, Data, Declaration, Setting, Values
 
 
 def _most(data: Data) -> float:
     return ZERO_SHARE * largest_N(data)
 
 
-def _drifting(shown: Array, v: Mapping[str, float], at: Setting) -> Array:
+def _drifting(shown: Array, v: Values, at: Setting) -> Array:
     """One cell reads all specimens, so that its zero drifts in N."""
     return shown + at.kPa_per_N * drift(at.time_s, v)
 

@@ -1,12 +1,9 @@
 """Force lag."""
 
-from collections.abc import Mapping
-
 from ..lags import first_order_lag
 from ..load_cell import if_timed
-from ..parameter import Parameter
 from ..ringing import swinging
-from .declaration import BENCH, CELL, Array, Declaration, Law, Setting
+from .declaration import BENCH, CELL, Array, Declaration, Law, Parameter, Setting, Values
 
 FILTER = (Parameter("time_s", "s", 0.0, 2.0, 0.0, (0.05, 0.5), "amplifiers average over 1 ms to 1 s"),)
 # Of two poles: equal ones are damped by 1, a Bessel filter's by 0.87, a Butterworth filter's by 0.71.
@@ -16,11 +13,11 @@ OF_TWO = (
 )
 
 
-def _delayed(force: Array, v: Mapping[str, float], at: Setting) -> Array:
+def _delayed(force: Array, v: Values, at: Setting) -> Array:
     return first_order_lag(at.time_s, force, v["time_s"])
 
 
-def _delayed_twice(force: Array, v: Mapping[str, float], at: Setting) -> Array:
+def _delayed_twice(force: Array, v: Values, at: Setting) -> Array:
     return swinging(at.time_s, force[None], 1.0 / v["period_s"], v["damping"])[0]
 
 

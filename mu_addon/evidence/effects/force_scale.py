@@ -1,8 +1,7 @@
 """Force scale."""
 
 from ..load_cell import if_timed
-from ..parameter import factor
-from .declaration import BENCH, CELL, Declaration, Law
+from .declaration import BENCH, CELL, Declaration, Law, factor
 
 EFFECT = Declaration(
     mechanism="the force is scaled: load cell, section as typed, clamping or specimen",

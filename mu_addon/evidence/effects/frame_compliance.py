@@ -5,8 +5,7 @@ from typing import Any
 
 import numpy as np
 
-from ..parameter import Parameter
-from .declaration import ALL, MACHINE, Array, Declaration, Law, Setting
+from .declaration import ALL, MACHINE, Array, Declaration, Law, Parameter, Setting, Values
 
 FRAME = Parameter("mm_per_N", "mm/N", 0.0, 0.1, 0.0, (0.005,), "steel 1e-5, printed plates 0.1")
 # A compliance that falls with the load: grips that settle, wedges that bite. Source of its form: a hyperbolic
@@ -22,12 +21,12 @@ Frame = tuple[float, Callable[[Array], Array]]
 """Strain that it takes a kPa at no load, and strain (n,) at stresses (n,) in kPa."""
 
 
-def _linear(frame: Frame | None, v: Mapping[str, float], at: Setting) -> Frame:
+def _linear(frame: Frame | None, v: Values, at: Setting) -> Frame:
     first = at.strain_per_kPa_mm_N * v["mm_per_N"]
     return first, lambda stress: first * stress
 
 
-def _settling(frame: Frame | None, v: Mapping[str, float], at: Setting) -> Frame:
+def _settling(frame: Frame | None, v: Values, at: Setting) -> Frame:
     first, stays = at.strain_per_kPa_mm_N * v["settling_mm_N"], v["stays"]
     load = v["settled_at"] * (at.largest_N or 1.0) * at.kPa_per_N
 
@@ -37,7 +36,7 @@ def _settling(frame: Frame | None, v: Mapping[str, float], at: Setting) -> Frame
     return first, taken
 
 
-def _clamp(beam: Mapping[str, Any], v: Mapping[str, float], at: Setting) -> Mapping[str, Any]:
+def _clamp(beam: Mapping[str, Any], v: Values, at: Setting) -> Mapping[str, Any]:
     return {**beam, "give": v["mm_per_N"] / at.thickness_mm**2 * at.bending / at.length_mm}
 
 

@@ -1,8 +1,7 @@
 """Geometry as typed."""
 
 from ..ownership import by_specimen
-from ..parameter import factor
-from .declaration import MACHINE, Declaration, Law
+from .declaration import MACHINE, Declaration, Law, factor
 
 EFFECT = Declaration(
     mechanism="a specimen's height differs from the entered one, which scales its strain",

@@ -7,12 +7,11 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from ..parameter import Parameter
 from ..unit_body import Body, UnitEffect
 
 if TYPE_CHECKING:
     from ...meshing.mesh import Mesh
-from .declaration import ALL, IN_MODEL, Array, Declaration, Law, Setting
+from .declaration import ALL, IN_MODEL, Array, Declaration, Law, Parameter, Setting, Values
 
 G = 9.80665
 """Of the earth, in m/s2."""
@@ -29,7 +28,7 @@ DENSITY = Parameter(
 )
 
 
-def _weighed(beam: Mapping[str, Any], v: Mapping[str, float], at: Setting) -> Mapping[str, Any]:
+def _weighed(beam: Mapping[str, Any], v: Values, at: Setting) -> Mapping[str, Any]:
     # kg/m3 is 1e-9 kg/mm3.
     weight = 1e-9 * G * v["density_kg_m3"] * at.width_mm * at.thickness_mm * at.length_mm
     return {**beam, "weight": weight * at.length_mm**2 / at.bending}

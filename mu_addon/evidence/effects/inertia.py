@@ -1,12 +1,9 @@
 """Inertia."""
 
-from collections.abc import Mapping
-
 import numpy as np
 
-from ..parameter import Parameter
 from ..ringing import swinging
-from .declaration import Array, Declaration, Law, Setting
+from .declaration import Array, Declaration, Law, Parameter, Setting, Values
 
 # Longest period of units of the printed sizes, with their damping.
 SLOWEST_s = 2.0
@@ -33,12 +30,12 @@ TWO_MODES = (
 )
 
 
-def _swinging(still: Array, v: Mapping[str, float], at: Setting) -> Array:
+def _swinging(still: Array, v: Values, at: Setting) -> Array:
     moved = swinging(at.time_s, still, 1.0 / v["period_s"], v["damping"])
     return _seen(still, moved, v["period_s"], at)
 
 
-def _in_two_modes(still: Array, v: Mapping[str, float], at: Setting) -> Array:
+def _in_two_modes(still: Array, v: Values, at: Setting) -> Array:
     first, fast = (
         swinging(at.time_s, still, times / v["first_s"], v["loss"]) for times in (1.0, v["faster"])
     )

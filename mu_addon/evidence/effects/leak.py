@@ -1,14 +1,13 @@
 """Leak."""
 
 import math
-from collections.abc import Callable, Mapping
+from collections.abc import Callable
 
 import attrs
 
 from ...measured.folder import ATMOSPHERE_kPa
 from ..chamber import AIR_GAMMA, Chamber
-from ..parameter import Parameter
-from .declaration import DRIVEN, EITHER, Array, Declaration, Law, Setting
+from .declaration import DRIVEN, EITHER, Array, Declaration, Law, Parameter, Setting, Values
 
 HOLD = ("pressure_hold",)
 # Pressure outside over that inside below which flow through a hole grows no more.
@@ -37,7 +36,7 @@ Flow = Callable[[float], float]
 """Rate in 1/s, of the gas of the chamber at one atmosphere, at a pressure in atmospheres."""
 
 
-def _through_the_line(p: Array, v: Mapping[str, float], at: Setting) -> Array:
+def _through_the_line(p: Array, v: Values, at: Setting) -> Array:
     """The line feeds the leak: tau dp_c/dt = p - p_c - leak p_c."""
     at.fed = 1.0 + v["conductance_ratio"]
     return p / at.fed
@@ -64,18 +63,18 @@ def _seeping(loss: float, inertia: float = 0.0) -> Flow:
     return flow
 
 
-def _until_tight(gas: Chamber, v: Mapping[str, float], at: Setting) -> Chamber:
+def _until_tight(gas: Chamber, v: Values, at: Setting) -> Chamber:
     loss = v["loss_until_tight_per_s"]
     return _lost(gas, loss, _seeping(loss), 0.0, v["tight_s"])
 
 
-def _above(gas: Chamber, v: Mapping[str, float], at: Setting) -> Chamber:
+def _above(gas: Chamber, v: Values, at: Setting) -> Chamber:
     """Flow in proportion to the excess of a pressure over another."""
     loss, opens = v["loss_above_per_s"], 1.0 + v["opens_kPa"] / ATMOSPHERE_kPa
     return _lost(gas, loss, lambda P: loss * max(P - opens, 0.0), 0.0)
 
 
-def _by_a_hole(gas: Chamber, v: Mapping[str, float], at: Setting) -> Chamber:
+def _by_a_hole(gas: Chamber, v: Values, at: Setting) -> Chamber:
     """Isentropic flow through a hole (Saint-Venant and Wantzel)."""
     hole = v["hole_per_s"]
     one, other, scale = 2 / AIR_GAMMA, (AIR_GAMMA + 1) / AIR_GAMMA, hole * math.sqrt(2 / (AIR_GAMMA - 1))

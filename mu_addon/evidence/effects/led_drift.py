@@ -1,14 +1,11 @@
 """Led drift."""
 
-from collections.abc import Mapping
-
 import numpy as np
 
-from ..parameter import Parameter
-from .declaration import BENCH, Array, Declaration, Law, Setting
+from .declaration import BENCH, Array, Declaration, Law, Parameter, Setting, Values
 
 
-def _settling(exponent: Array, v: Mapping[str, float], at: Setting) -> Array:
+def _settling(exponent: Array, v: Values, at: Setting) -> Array:
     return exponent - v["settled"] * np.expm1(-(at.time_s - at.time_s[0]) / v["settling_s"])
 
 

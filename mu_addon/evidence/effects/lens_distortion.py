@@ -1,12 +1,9 @@
 """Lens distortion."""
 
-from collections.abc import Mapping
-
 import attrs
 
 from ..camera import View
-from ..parameter import Parameter
-from .declaration import BENCH, CYCLED, Declaration, Law, Setting
+from .declaration import BENCH, CYCLED, Declaration, Law, Parameter, Setting, Values
 
 AT_TIP = Parameter(
     "at_tip",
@@ -19,7 +16,7 @@ AT_TIP = Parameter(
 )
 
 
-def _distorted(view: View, v: Mapping[str, float], at: Setting) -> View:
+def _distorted(view: View, v: Values, at: Setting) -> View:
     return attrs.evolve(view, lens=v["at_tip"])
 
 

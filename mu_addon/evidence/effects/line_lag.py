@@ -1,10 +1,7 @@
 """Line lag."""
 
-from collections.abc import Mapping
-
 from ..lags import first_order_lag
-from ..parameter import Parameter
-from .declaration import BENCH, DRIVEN, IN_MODEL, Array, Declaration, Law, Setting
+from .declaration import BENCH, DRIVEN, IN_MODEL, Array, Declaration, Law, Parameter, Setting, Values
 
 # A second law: the volume before the chambers (tube, filter, manifold) fills first. Two volumes, each behind
 # a resistance, have two real time constants, whatever their sizes.
@@ -14,7 +11,7 @@ TWO_VOLUMES = (
 )
 
 
-def _through_two(p: Array, v: Mapping[str, float], at: Setting) -> Array:
+def _through_two(p: Array, v: Values, at: Setting) -> Array:
     """One lag after the other, in partial fractions: exact for p linear between its samples."""
     slower, share = v["slower_s"] / at.fed, v["faster_share"]
     slow, fast = (first_order_lag(at.time_s, p, time) for time in (slower, share * slower))

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 import re
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable, Sequence
 from typing import Any
 
 import attrs
@@ -13,8 +13,7 @@ import numpy as np
 from ...design.parameters import Chambers
 from ...measured import Experiment
 from ..lags import DEADBAND_kPa, play_operator
-from ..parameter import Parameter
-from .declaration import ALL, CYCLED, Array, Data, Declaration, Law, Setting
+from .declaration import ALL, CYCLED, Array, Data, Declaration, Law, Parameter, Setting, Values
 
 ANGLE = "angle_deg"
 CHANNEL = re.compile(r"marker(\d+)_([yz])_mm")
@@ -178,7 +177,7 @@ def _law(law: Law, slip: Slip, most: float, total_s: float, tried: int) -> Law:
     return attrs.evolve(law, parameters=(*shape, moment), mechanism=words, tried=tried)
 
 
-def _slipped(y: Array, v: Mapping[str, float], at: Setting) -> Array:
+def _slipped(y: Array, v: Values, at: Setting) -> Array:
     """Channels (c, n) with the displacement, in the picture, of each marker that slipped.
 
     It rotates with the surface that the marker sits on: by twice the angle of the line from the inlet, as on

@@ -2,9 +2,8 @@
 
 import attrs
 
-from ..parameter import Parameter
 from ..unit_body import Body, UnitEffect
-from .declaration import ALL, Declaration
+from .declaration import ALL, Declaration, Parameter
 
 
 def _refined(body: Body, share: float) -> Body:

@@ -1,12 +1,11 @@
 """Mullins softening."""
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable
 from functools import lru_cache
 
 import numpy as np
 
-from ..parameter import Parameter
-from .declaration import CYCLED, IN_MODEL, MACHINE, Array, Declaration, Law, Setting
+from .declaration import CYCLED, IN_MODEL, MACHINE, Array, Declaration, Law, Parameter, Setting, Values
 
 BY_ENERGY = (
     Parameter("softening", "", 0.0, 0.7, 0.0, (0.1,), "1/r of Ogden and Roxburgh 1999"),
@@ -43,13 +42,13 @@ def _left(energy: Array, before: float, softening: float, width: float) -> Array
     return np.asarray(1.0 - softening * erf((most - energy) / width))
 
 
-def _softer_unit(p: Array, v: Mapping[str, float], at: Setting) -> Array:
+def _softer_unit(p: Array, v: Values, at: Setting) -> Array:
     """W is the square of the pressure, as the energy of the virgin unit nearly is."""
     width = v["energy_share"] * v.get(REFERENCE, at.reference_kPa) ** 2
     return p / _left(p**2, at.before_kPa**2, v["softening"], width)
 
 
-def _softer(stress: Array, v: Mapping[str, float], at: Setting) -> Array:
+def _softer(stress: Array, v: Values, at: Setting) -> Array:
     strain = at.path
     energy = _energy(at.law, strain)
     before = float(_energy(at.law, np.array([at.past.strain * (np.sign(strain.sum()) or 1.0)]))[0])
@@ -57,12 +56,12 @@ def _softer(stress: Array, v: Mapping[str, float], at: Setting) -> Array:
     return stress * _left(energy, before, v["softening"], width)
 
 
-def _by_peak(stress: Array, v: Mapping[str, float], at: Setting) -> Array:
+def _by_peak(stress: Array, v: Values, at: Setting) -> Array:
     below, _ = _below(at)
     return stress * np.exp(-v["by_peak"] * below ** v["power"])
 
 
-def _by_share(stress: Array, v: Mapping[str, float], at: Setting) -> Array:
+def _by_share(stress: Array, v: Values, at: Setting) -> Array:
     below, most = _below(at)
     way = below / np.maximum(v["width"] * most, 1e-12)
     return stress * (1 + v["lost"] * np.expm1(-(way ** v["shape"])))

@@ -1,11 +1,8 @@
 """Optical nonlinearity."""
 
-from collections.abc import Mapping
-
 import numpy as np
 
-from ..parameter import Parameter
-from .declaration import Array, Declaration, Law, Setting
+from .declaration import Array, Declaration, Law, Parameter, Setting, Values
 
 FROM_ONSET = (
     Parameter("excess", "", -0.9, 10.0, 0.0, (0.3,), "loss at 90 deg over proportional, less 1"),
@@ -23,16 +20,16 @@ BY_CUBE = (
 )
 
 
-def _from_onset(angle: Array, v: Mapping[str, float], at: Setting) -> Array:
+def _from_onset(angle: Array, v: Values, at: Setting) -> Array:
     beyond = np.maximum(np.abs(angle) - v["onset_deg"], 0.0)
     return angle + np.sign(angle) * v["excess"] * beyond**2 / 90.0
 
 
-def _by_power(angle: Array, v: Mapping[str, float], at: Setting) -> Array:
+def _by_power(angle: Array, v: Values, at: Setting) -> Array:
     return angle + 90.0 * v["at_90_deg"] * np.sign(angle) * np.abs(angle / 90.0) ** v["power"]
 
 
-def _by_cube(angle: Array, v: Mapping[str, float], at: Setting) -> Array:
+def _by_cube(angle: Array, v: Values, at: Setting) -> Array:
     x = angle / 90.0
     return angle + 90.0 * (v["square"] * np.abs(x) * x + v["cube"] * x**3)
 

@@ -2,13 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-
 import attrs
 
-from ..parameter import Parameter
 from ..unit_body import Body, UnitEffect
-from .declaration import IN_MODEL, Data, Declaration, Law, Setting
+from .declaration import IN_MODEL, Data, Declaration, Law, Parameter, Setting, Values
 
 OFFSET = Parameter(
     "offset_mm",
@@ -27,7 +24,7 @@ def _within(law: Law, data: Data) -> tuple[Law, ...]:
     return (attrs.evolve(law, parameters=(size.narrowed(size.low, data.largest_offset_mm),)),)
 
 
-def _outward(printed: tuple[float, float], v: Mapping[str, float], at: Setting) -> tuple[float, float]:
+def _outward(printed: tuple[float, float], v: Values, at: Setting) -> tuple[float, float]:
     offset, excess = printed
     return offset + v["offset_mm"], excess
 

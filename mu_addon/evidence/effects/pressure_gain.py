@@ -1,7 +1,6 @@
 """Pressure gain."""
 
-from ..parameter import factor
-from .declaration import BENCH, OF_UNITS, Declaration, Law
+from .declaration import BENCH, OF_UNITS, Declaration, Law, factor
 
 EFFECT = Declaration(
     mechanism="the pressure gauge has a gain error",

@@ -4,8 +4,7 @@ from __future__ import annotations
 
 import attrs
 
-from ..parameter import Parameter
-from .declaration import BENCH, OF_UNITS, Data, Declaration, Law
+from .declaration import BENCH, OF_UNITS, Data, Declaration, Law, Parameter
 
 # Of the largest reading: a gauge with a larger offset of its zero is noticed before any measurement.
 OFFSET_SHARE, LEAST_OFFSET_kPa = 0.1, 1.0

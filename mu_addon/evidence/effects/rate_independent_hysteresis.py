@@ -1,15 +1,13 @@
 """Rate-independent hysteresis."""
 
 import math
-from collections.abc import Mapping
 from functools import lru_cache
 from itertools import pairwise
 
 import numpy as np
 
 from ..lags import play_operator
-from ..parameter import Parameter
-from .declaration import CYCLED, IN_MODEL, MACHINE, Array, Declaration, Law, Setting
+from .declaration import CYCLED, IN_MODEL, MACHINE, Array, Declaration, Law, Parameter, Setting, Values
 
 FRICTION = (
     Parameter("share", "", 0.0, 0.6, 0.0, (0.1,), "share of the stiffness carried by friction"),
@@ -55,11 +53,11 @@ _AT, _WEIGHT = np.polynomial.legendre.leggauss(8)
 _AT, _WEIGHT = (_AT + 1) / 2, _WEIGHT / 2
 
 
-def _sliding(p: Array, v: Mapping[str, float], at: Setting) -> Array:
+def _sliding(p: Array, v: Values, at: Setting) -> Array:
     return (1.0 - v["share"]) * p + v["share"] * play_operator(p, v["threshold_kPa"])
 
 
-def _elastic(strain: Array, v: Mapping[str, float], at: Setting) -> Array:
+def _elastic(strain: Array, v: Values, at: Setting) -> Array:
     """Elastic strain (n,), which determines stress, from the strain (n,) of a new specimen in order.
 
     First loading to e gives h e + (1 - h) m (1 - exp(-e/m)), with the mean yield strain m and the share h
@@ -100,7 +98,7 @@ def _by_masing(strain: bytes, per_strain: float, hardening: float) -> Array:
     return kept
 
 
-def _yielded(stress: Array, v: Mapping[str, float], at: Setting) -> Array:
+def _yielded(stress: Array, v: Values, at: Setting) -> Array:
     """Stress (n,) of which a share yields as one element, at the strains (n,) of a new specimen in order.
 
     With the law's stress s and its first slope k, (1 - a) s + a k m z, where a is the share, m the yield

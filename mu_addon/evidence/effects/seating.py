@@ -1,14 +1,13 @@
 """Seating."""
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable
 
 import attrs
 import numpy as np
 
 from ..load_cell import LENGTH_mm
-from ..parameter import Parameter
 from ..unit_body import HELD, UnitEffect
-from .declaration import EITHER, MACHINE, Array, Declaration, Law, Setting
+from .declaration import EITHER, MACHINE, Array, Declaration, Law, Parameter, Setting, Values
 
 # A preload needs faces to carry it: it builds up over this share of the gap, so that seating has one size.
 ONSET_mm = 0.01
@@ -21,7 +20,7 @@ TOE = (
 Stress = Callable[[Array], Array]
 
 
-def _closing(law: Stress, v: Mapping[str, float], at: Setting) -> Stress:
+def _closing(law: Stress, v: Values, at: Setting) -> Stress:
     """The law between faces that close, with strain counted from the preload."""
     gap = v["gap_mm"]
     toe = gap / (at.experiment.length_mm or LENGTH_mm * at.experiment.scale)

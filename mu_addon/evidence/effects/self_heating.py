@@ -5,8 +5,7 @@ from collections.abc import Iterable, Mapping, Sequence
 import numpy as np
 
 from ...measured import Experiment
-from ..parameter import factor
-from .declaration import Declaration, Law
+from .declaration import Declaration, Law, factor
 
 # Rates of tests are two where they differ by more than this factor. Elastomers soften by some 0.5 % a kelvin,
 # and double their modulus over some decades of rate at most.

@@ -1,10 +1,7 @@
 """Skin cure."""
 
-from collections.abc import Mapping
-
-from ..parameter import Parameter
 from ..unit_body import Body, UnitEffect
-from .declaration import IN_MODEL, Declaration, Law, Setting
+from .declaration import IN_MODEL, Declaration, Law, Parameter, Setting, Values
 
 # A skin of this depth represents every skin of the same depth times excess modulus.
 SKIN_MM = 0.1
@@ -19,7 +16,7 @@ EXCESS = Parameter(
 )
 
 
-def _stiffer(printed: tuple[float, float], v: Mapping[str, float], at: Setting) -> tuple[float, float]:
+def _stiffer(printed: tuple[float, float], v: Values, at: Setting) -> tuple[float, float]:
     offset, excess = printed
     return offset, excess + v["excess_mm"]
 

@@ -3,8 +3,7 @@
 from collections.abc import Iterable, Mapping, Sequence
 
 from ...measured import Experiment
-from ..parameter import factor
-from .declaration import Declaration, Law
+from .declaration import Declaration, Law, factor
 
 
 def _later(tests: Sequence[Experiment]) -> Mapping[str, Iterable[str]]:

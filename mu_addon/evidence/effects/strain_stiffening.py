@@ -7,14 +7,13 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from ..parameter import Parameter
 from ..stretching import first_invariant, ogden, yeoh
 from ..unit_body import UnitEffect
 
 if TYPE_CHECKING:
     from ...fem.materials import Materials
     from ...meshing.mesh import Mesh
-from .declaration import IN_MODEL, Array, Declaration, Law, Setting
+from .declaration import IN_MODEL, Array, Declaration, Law, Parameter, Setting, Values
 
 YEOH = Parameter(
     "c2_over_c1", "", -0.03, 2.0, 0.0, (0.02, 0.3), "Yeoh 1993: -0.01 of filled rubber to 1 of foams"
@@ -49,11 +48,11 @@ BUCKLING = (
 )
 
 
-def _yeoh(stress: Array, v: Mapping[str, float], at: Setting) -> Array:
+def _yeoh(stress: Array, v: Values, at: Setting) -> Array:
     return yeoh(at.modulus_kPa / 6, v["c2_over_c1"], at.mode, 1 + at.strain)
 
 
-def _power(stress: Array, v: Mapping[str, float], at: Setting) -> Array:
+def _power(stress: Array, v: Values, at: Setting) -> Array:
     """Held constant where it would be without bound."""
     form = v["form"]
     x = v["by_invariant"] * (first_invariant(at.mode, 1 + at.strain) - 3)
@@ -62,20 +61,20 @@ def _power(stress: Array, v: Mapping[str, float], at: Setting) -> Array:
     return stress * np.exp(np.minimum(x, 20.0))
 
 
-def _ogden(stress: Array, v: Mapping[str, float], at: Setting) -> Array:
+def _ogden(stress: Array, v: Values, at: Setting) -> Array:
     return stress + v["by_stretch"] * ogden(at.modulus_kPa, v["stretch_power"], at.mode, 1 + at.strain)
 
 
-def _closing(stress: Array, v: Mapping[str, float], at: Setting) -> Array:
+def _closing(stress: Array, v: Values, at: Setting) -> Array:
     # Slope 1 at first; a strain near 1/closing would be beyond the last gap between struts.
     return stress / np.maximum(1 - v["closing"] * at.strain, 0.02)
 
 
-def _buckling(stress: Array, v: Mapping[str, float], at: Setting) -> Array:
+def _buckling(stress: Array, v: Values, at: Setting) -> Array:
     return stress / np.maximum(1 - v["at_tenth"] * (10.0 * np.abs(at.strain)) ** v["order"], 0.02)
 
 
-def _bent(beam: Mapping[str, Any], v: Mapping[str, float], at: Setting) -> Mapping[str, Any]:
+def _bent(beam: Mapping[str, Any], v: Values, at: Setting) -> Mapping[str, Any]:
     # c2 (I1 - 3)^2 adds 6 c2/c1 e^2 to the modulus, and 3/20 of that at the faces to the moment.
     return {**beam, "stiffening": 0.9 * v["c2_over_c1"] * (at.thickness_mm / at.length_mm) ** 2}
 

@@ -1,16 +1,13 @@
 """Strut thickness."""
 
-from collections.abc import Mapping
-
-from ..parameter import Parameter
-from .declaration import Declaration, Law, Setting
+from .declaration import Declaration, Law, Parameter, Setting, Values
 
 THICKER = Parameter(
     "thicker_mm", "mm", -0.4, 0.6, 0.0, (0.05,), "diameter less that drawn; printers are 0.05 to 0.2 mm off"
 )
 
 
-def _thicker(printed: tuple[float, float], v: Mapping[str, float], at: Setting) -> tuple[float, float]:
+def _thicker(printed: tuple[float, float], v: Values, at: Setting) -> tuple[float, float]:
     offset, excess = printed
     # Both sides of a strut.
     return offset + 0.5 * v["thicker_mm"], excess

@@ -2,14 +2,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-
 import attrs
 import numpy as np
 
 from ...measured import Experiment
-from ..parameter import Parameter
-from .declaration import BENCH, DRIVEN, Array, Data, Declaration, Law, Setting
+from .declaration import BENCH, DRIVEN, Array, Data, Declaration, Law, Parameter, Setting, Values
 
 # Of the largest pressure: what a supply may fall short by, and where fits begin.
 MOST_SHORT, STARTS = 0.8, (0.15,)
@@ -28,7 +25,7 @@ def _short(law: Law, data: Data) -> tuple[Law, ...]:
     return (attrs.evolve(law, parameters=(size,)),)
 
 
-def _given(p: Array, v: Mapping[str, float], at: Setting) -> Array:
+def _given(p: Array, v: Values, at: Setting) -> Array:
     most = at.largest - v["short_kPa"]
     return np.clip(p, -most, most)
 

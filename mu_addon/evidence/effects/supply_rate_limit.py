@@ -2,13 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-
 import attrs
 import numpy as np
 
-from ..parameter import Parameter
-from .declaration import BENCH, DRIVEN, Array, Data, Declaration, Law, Setting
+from .declaration import BENCH, DRIVEN, Array, Data, Declaration, Law, Parameter, Setting, Values
 from .supply_limit import driven
 
 # Share of a record's changes that are slower than its fastest; of those the time a kPa, times the starts.
@@ -25,7 +22,7 @@ def _slow(law: Law, data: Data) -> tuple[Law, ...]:
     return (attrs.evolve(law, parameters=(size,)),)
 
 
-def _given(p: Array, v: Mapping[str, float], at: Setting) -> Array:
+def _given(p: Array, v: Values, at: Setting) -> Array:
     x, found = float(p[0]), [float(p[0])]
     for to, most in zip(p[1:].tolist(), (np.diff(at.time_s) / v["slowness_s_kPa"]).tolist(), strict=True):
         x += min(max(to - x, -most), most)

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
 from typing import Any
 
 import attrs
@@ -11,8 +10,7 @@ import numpy as np
 
 from ...measured.folder import ATMOSPHERE_kPa
 from ..chamber import AIR_GAMMA, ROOM, ROOM_K, Chamber, beginning_kPa, warmed
-from ..parameter import Parameter
-from .declaration import EITHER, MACHINE, OF_UNITS, Array, Data, Declaration, Law, Setting
+from .declaration import EITHER, MACHINE, OF_UNITS, Array, Data, Declaration, Law, Parameter, Setting, Values
 
 HOLD = ("pressure_hold",)
 REFERENCE_C = 23.0
@@ -33,7 +31,7 @@ TWO_RATES = (
 )
 
 
-def _warm(modulus: Any, v: Mapping[str, float], at: Setting) -> Any:
+def _warm(modulus: Any, v: Values, at: Setting) -> Any:
     kelvin = at.experiment.temperature_C - REFERENCE_C
     return modulus * (1.0 + v["per_K"] * (kelvin if math.isfinite(kelvin) else 0.0))
 
@@ -60,16 +58,16 @@ def _excess(gas: Chamber, excess_K: float, left: Any) -> Chamber:
     return attrs.evolve(gas, warming=(*gas.warming, lambda t: excess_K * left(t) / (ROOM_K + excess_K)))
 
 
-def _cooling(gas: Chamber, v: Mapping[str, float], at: Setting) -> Chamber:
+def _cooling(gas: Chamber, v: Values, at: Setting) -> Chamber:
     return _excess(gas, v["cooling_K"], lambda t: np.expm1(-t / v["cooling_s"]))
 
 
-def _compressed(gas: Chamber, v: Mapping[str, float], at: Setting) -> Chamber:
+def _compressed(gas: Chamber, v: Values, at: Setting) -> Chamber:
     excess_K = v["warmth"] * _adiabatic_K((gas.initial_kPa + ATMOSPHERE_kPa) / ATMOSPHERE_kPa)
     return _excess(gas, excess_K, lambda t: np.expm1(-t / v["cools_s"]))
 
 
-def _at_two_rates(gas: Chamber, v: Mapping[str, float], at: Setting) -> Chamber:
+def _at_two_rates(gas: Chamber, v: Values, at: Setting) -> Chamber:
     first_s, later, times = v["first_s"], v["later_share"], v["later_times"]
     return _excess(
         gas,
@@ -78,7 +76,7 @@ def _at_two_rates(gas: Chamber, v: Mapping[str, float], at: Setting) -> Chamber:
     )
 
 
-def _in_a_warm_room(p: Array, v: Mapping[str, float], at: Setting) -> Array:
+def _in_a_warm_room(p: Array, v: Values, at: Setting) -> Array:
     if ROOM in at.experiment.columns:
         return p
     return warmed(p, v["room_K_per_hour"] * (at.time_s - at.time_s[0]) / 3600.0)

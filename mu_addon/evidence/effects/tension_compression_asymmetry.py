@@ -2,26 +2,24 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from typing import TYPE_CHECKING
 
 import attrs
 import numpy as np
 
-from ..parameter import Parameter
 from ..unit_body import UnitEffect
 
 if TYPE_CHECKING:
     from ...fem.materials import Materials
     from ...meshing.mesh import Mesh
-from .declaration import IN_MODEL, Array, Declaration, Law, Setting
+from .declaration import IN_MODEL, Array, Declaration, Law, Parameter, Setting, Values
 
 # Share of a one-sided foam on its other side: laws require more than none.
 NEXT_TO_NOTHING = 1e-3
 EXCESS = Parameter("excess", "", -0.8, 4.0, 0.0, (0.3,), "stiffness in compression over tension, less 1")
 
 
-def _signed(stress: Array, v: Mapping[str, float], at: Setting) -> Array:
+def _signed(stress: Array, v: Values, at: Setting) -> Array:
     return stress * np.where(at.strain < 0, 1 + v["excess"], 1.0)
 
 

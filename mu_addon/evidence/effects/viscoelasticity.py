@@ -1,14 +1,22 @@
 """Viscoelasticity."""
 
-from collections.abc import Mapping
-
 import attrs
 import numpy as np
 
 from ..chamber import Chamber
 from ..lags import first_order_lag
-from ..parameter import Parameter
-from .declaration import CYCLED, DRIVEN, IN_MODEL, MACHINE, Array, Declaration, Law, Setting
+from .declaration import (
+    CYCLED,
+    DRIVEN,
+    IN_MODEL,
+    MACHINE,
+    Array,
+    Declaration,
+    Law,
+    Parameter,
+    Setting,
+    Values,
+)
 
 HOLD = ("pressure_hold",)
 # Relaxation by the second law goes on for so many decades of time.
@@ -49,19 +57,19 @@ Elements = tuple[tuple[float, float], ...]
 """Share of the modulus, and time in s, of each part that relaxes."""
 
 
-def _one(p: Array, v: Mapping[str, float], at: Setting) -> Array:
+def _one(p: Array, v: Values, at: Setting) -> Array:
     share = v["share"]
     return (1.0 - share) * p + share * first_order_lag(at.time_s, p, v["time_s"] / (1.0 - share))
 
 
-def _stress_one(stress: Array, v: Mapping[str, float], at: Setting) -> Array:
+def _stress_one(stress: Array, v: Values, at: Setting) -> Array:
     # From equilibrium: sigma = sigma_0 - share of the dashpot's strain.
     if at.time_s is None:
         return stress
     return stress - v["share"] * first_order_lag(at.time_s, stress, v["time_s"])
 
 
-def _element(elements: Elements, v: Mapping[str, float], at: Setting) -> Elements:
+def _element(elements: Elements, v: Values, at: Setting) -> Elements:
     return (*elements, (v["share"], v["time_s"] / (1.0 - v["share"])))
 
 
@@ -70,16 +78,16 @@ def _in_decades(at: Setting, x: Array, onset_s: float) -> Array:
     return np.asarray(sum(first_order_lag(at.time_s, x, onset_s * 10.0**k) for k in range(DECADES)))
 
 
-def _decades(p: Array, v: Mapping[str, float], at: Setting) -> Array:
+def _decades(p: Array, v: Values, at: Setting) -> Array:
     share = v["per_decade"]
     return (1.0 - DECADES * share) * p + share * _in_decades(at, p, v["onset_s"])
 
 
-def _stress_decades(stress: Array, v: Mapping[str, float], at: Setting) -> Array:
+def _stress_decades(stress: Array, v: Values, at: Setting) -> Array:
     return stress if at.time_s is None else stress - v["per_decade"] * _in_decades(at, stress, v["onset_s"])
 
 
-def _elements(elements: Elements, v: Mapping[str, float], at: Setting) -> Elements:
+def _elements(elements: Elements, v: Values, at: Setting) -> Elements:
     return (*elements, *((v["per_decade"], v["onset_s"] * 10.0**k) for k in range(DECADES)))
 
 
@@ -89,27 +97,27 @@ def spread_lag(time_s: Array, x: Array, middle_s: float, decades: float) -> Arra
     return np.asarray(sum(first_order_lag(time_s, x, time) for time in times.tolist()) / TIMES)
 
 
-def _spread(p: Array, v: Mapping[str, float], at: Setting) -> Array:
+def _spread(p: Array, v: Values, at: Setting) -> Array:
     share = v["spread_share"]
     return (1.0 - share) * p + share * spread_lag(at.time_s, p, v["middle_s"] / (1.0 - share), v["decades"])
 
 
-def _stress_spread(stress: Array, v: Mapping[str, float], at: Setting) -> Array:
+def _stress_spread(stress: Array, v: Values, at: Setting) -> Array:
     if at.time_s is None:
         return stress
     return stress - v["spread_share"] * spread_lag(at.time_s, stress, v["middle_s"], v["decades"])
 
 
-def _creeping(gas: Chamber, v: Mapping[str, float], at: Setting) -> Chamber:
+def _creeping(gas: Chamber, v: Values, at: Setting) -> Chamber:
     return attrs.evolve(gas, creep_per_kPa=1e-3 * v["creep_per_MPa"], onset_s=v["onset_s"])
 
 
-def _growing(gas: Chamber, v: Mapping[str, float], at: Setting) -> Chamber:
+def _growing(gas: Chamber, v: Values, at: Setting) -> Chamber:
     growth, begins = 1e-3 * v["growth_per_MPa"], v["begins_s"]
     return attrs.evolve(gas, softness=(*gas.softness, lambda t: growth * np.log10(1.0 + t / begins)))
 
 
-def _by_power(gas: Chamber, v: Mapping[str, float], at: Setting) -> Chamber:
+def _by_power(gas: Chamber, v: Values, at: Setting) -> Chamber:
     growth, power = 1e-3 * v["findley_per_MPa"], v["findley_power"]
     return attrs.evolve(gas, softness=(*gas.softness, lambda t: growth * (t / 100.0) ** power))
 

@@ -2,9 +2,8 @@
 
 import attrs
 
-from ..parameter import Parameter
 from ..unit_body import Body, UnitEffect
-from .declaration import IN_MODEL, Declaration
+from .declaration import IN_MODEL, Declaration, Parameter
 
 
 def _thickened(body: Body, factor: float) -> Body:

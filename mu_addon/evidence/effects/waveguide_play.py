@@ -1,8 +1,7 @@
 """Waveguide play."""
 
 from ..lags import play_operator
-from ..parameter import Parameter
-from .declaration import Declaration, Law
+from .declaration import Declaration, Law, Parameter
 
 EFFECT = Declaration(
     mechanism=(
