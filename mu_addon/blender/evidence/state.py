@@ -4,6 +4,7 @@
 
 import csv
 import hashlib
+from collections.abc import Iterable
 from pathlib import Path
 from typing import Any
 
@@ -89,15 +90,15 @@ def folder_of(root: Any) -> Path:
     return studies.folder_of(root) / FOLDER
 
 
-def _detail(data: dict[str, Any]) -> str:
+def _detail(kinds: Iterable[str]) -> str:
     """Detail of a diagnosis: the kinds of its experiments, which decide what is simulated."""
-    return f"diagnose {' '.join(sorted(kind for kind, *_ in data.values()))}"
+    return f"diagnose {' '.join(sorted(kinds))}"
 
 
 def _timed(folder: Path) -> tuple[str, dict[str, Any]]:
     """Detail of a finished diagnosis, and the seconds of its stages."""
-    data = parse_toml(file_text(folder / "diagnose.toml"), "diagnose.toml")["data"]
-    return _detail(data), parse_json(file_bytes(folder / "summary.json"), "summary.json")["seconds"]
+    summary = parse_json(file_bytes(folder / "summary.json"), "summary.json")
+    return _detail(kind for kind, _ in summary["experiments"].values()), summary["seconds"]
 
 
 def announced(root: Any) -> float | None:
@@ -105,7 +106,7 @@ def announced(root: Any) -> float | None:
     found = measured_data(root)
     if found is None or found.measured is None:
         return None
-    return timings.announced(_detail(found.digest["data"]))
+    return timings.announced(_detail(e.kind for e in found.measured.experiments))
 
 
 DIAGNOSIS = JobKind(FOLDER, lambda root: root.mu_unit.uuid, folder_of, "diagnosis", heavy=True)
@@ -128,13 +129,11 @@ def measured_data(root: Any) -> MeasuredFolder | None:
 def _read_data(folder: Path) -> MeasuredFolder:
     try:
         measured = read_folder(folder)
-        described = hashlib.sha256(file_bytes(folder / FILE)).hexdigest()
     except MuError as error:
         return MeasuredFolder(None, error_text(error))
     except OSError as error:
         return MeasuredFolder(None, str(error))
-    data = {e.name: [e.kind, e.role, e.sha256] for e in measured.experiments}
-    return MeasuredFolder(measured, digest={"experiments_sha256": described, "data": data})
+    return MeasuredFolder(measured, digest={e.name: e.hash() for e in measured.experiments})
 
 
 def diagnosis(root: Any) -> ShownVerdict | None:
@@ -165,10 +164,11 @@ def _read_run(
 def write_inputs(root: Any, folder: Path) -> None:
     """Write the inputs of the unit's diagnosis into its folder; raises InputError and OutputError."""
     # Imported late: it needs the solver's packages, which a Blender may lack.
-    from ...usecases.diagnose.job import LAYOUT, Job
+    from ...studies.diagnose import Diagnose
 
     measured = read_folder(Path(bpy.path.abspath(root.mu_evidence.folder)))
-    write_run(folder, LAYOUT, Job(measured, to_unit(root.mu_unit)).texts())
+    study = Diagnose(data=measured, unit=to_unit(root.mu_unit)).complete()
+    write_run(folder, Diagnose.layout(), study.texts())
 
 
 def _json(path: Path) -> dict[str, Any]:
@@ -183,7 +183,7 @@ def _stale(root: Any, inputs: dict[str, Any], unit: str) -> str:
     found = measured_data(root)
     if found is None or found.measured is None:
         return "its measured data are not here"
-    if any(inputs.get(key) != value for key, value in found.digest.items()):
+    if inputs.get("data") != found.digest:
         return "made with other measured data"
     try:
         now = shape_hash(to_unit(root.mu_unit))

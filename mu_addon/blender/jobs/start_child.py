@@ -39,7 +39,7 @@ WRITERS = (
     "tomlkit",
     "mu_addon.evidence.effect",
     "mu_addon.evidence.prediction.specimen",
-    "mu_addon.evidence.unit_effects",
+    "mu_addon.evidence.unit_body",
     "mu_addon.fem.newton_settings",
     "mu_addon.placement.graph",
     "mu_addon.usecases.simulate_and_place.named_effects",

@@ -9,7 +9,7 @@ from mu_addon.blender.shared.panels import wrapped
 from mu_addon.blender.shared.wording import in_panel
 from mu_addon.blender.sidebar import menus
 from mu_addon.evidence.effects import DECLARED
-from mu_addon.usecases.diagnose.remedies import what_to_do
+from mu_addon.usecases.diagnose.words import what_to_do
 
 
 def test_what_to_do_about_a_cause_names_buttons_and_no_options():
