@@ -8,15 +8,14 @@ import bpy
 
 from ...optimization.freedoms import parameters
 from ...studies.optimize import FRONT
-from ..jobs.panel import job_state, start_button, timed
+from ..jobs.panel import draw_job, open_buttons, timed
 from ..shared.file_cache import icon_of
-from ..shared.panels import alert, wrapped
+from ..shared.panels import alert, fold, wrapped
 from ..shared.wording import in_panel, label
 from ..unit.base_classes import UnitPanel
 from . import state as optimization
 from .properties import ASKED, AT_PRESSURE, AT_TWO, FREE, NAMED, OF_PATH, YES, asks_curve, present, scale_of
 
-JOB = "optimize_"
 _KNOWN = parameters()
 UNITS = {"angle": "deg", "stiffness": "N/mm", "air_volume": "ml", "mass": "g", "print_time": "h"}
 UNITS |= {"deviation": "mm", "sensor_slope": "1/deg", "wall_thickness": "mm"}
@@ -32,7 +31,6 @@ FRONT_SIZE = 11.0
 class MU_PT_optimize(UnitPanel, bpy.types.Panel):
     """Find units that meet targets within given ranges of parameters"""
 
-    bl_idname = "MU_PT_optimize"
     bl_label = "Optimize"
 
     def show(self, layout, context, root):
@@ -48,9 +46,7 @@ class MU_PT_optimize(UnitPanel, bpy.types.Panel):
             _more(layout, props)
         if root.mu_unit.study.effects:
             wrapped(layout, "With the named effects that the panel Simulate lists", "LIGHT")
-        child = optimization.OPTIMIZATION.child(root)
-        start_button(layout, child, "mu.optimize", "CON_TRACKTO", text=start_words(root))
-        job_state(layout, child, "see below", JOB)
+        draw_job(layout, root, optimization.OPTIMIZATION, "mu.optimize", "CON_TRACKTO", start_words(root))
         found = optimization.findings(root)
         if found is not None and found.outcome:
             _results(layout, found)
@@ -68,8 +64,7 @@ def start_words(root) -> str:
 
 def _more(layout, props) -> None:
     """Draw a fold with seldom changed settings."""
-    header, body = layout.panel("MU_optimize_more", default_closed=True)
-    header.label(text="More")
+    body = fold(layout, "MU_optimize_more", "More")
     if not body:
         return
     body.prop(props, "robust")
@@ -167,9 +162,7 @@ def _results(layout, found) -> None:
         alert(box, f"Stands in the way: {name}")
     if found.other_start:
         wrapped(box, "The search started from other parameters than the unit has now", "INFO")
-    row = box.row(align=True)
-    row.operator("mu.optimize_open", text="Report", icon="URL").what = "report"
-    row.operator("mu.optimize_open", text="Folder", icon="FILE_FOLDER").what = "folder"
+    open_buttons(box, optimization.OPTIMIZATION)
     icon = icon_of(found.folder / FRONT)
     if icon is not None:
         layout.template_icon(icon, scale=FRONT_SIZE)
@@ -228,9 +221,3 @@ def target_icon(target) -> str:
     if target["objective"]:
         return "DRIVER_DISTANCE"
     return "CHECKMARK" if target["robust"] else BARELY if target["met"] else "ERROR"
-
-
-CLASSES = (MU_PT_optimize,)
-
-
-register, unregister = bpy.utils.register_classes_factory(CLASSES)

@@ -21,11 +21,11 @@ from ...errors import InputError
 from ...optimization.freedoms import PATH, RESIN, parameters
 from ...optimization.settings import CHECK_REFINE, EVALUATIONS, ROBUST, SELF_CONTACT
 from ...optimization.settings import REFINE as SEARCH_REFINE
-from ..shared.blender_property import blender_property, exact
-from ..shared.registration import property_group_factory
+from ..shared.blender_property import blender_property, exact, path_property
+from ..shared.registration import property_of
 from ..shared.wording import label, sentence
 from ..unit.fields import path_menu, true_scale
-from ..unit.properties import BESIDE_BLEND_FILE, section_of, to_unit
+from ..unit.properties import section_of, to_unit
 
 SECTIONS = ("chambers", "lattice", "grading", "material")
 """Sections whose numbers may be free; those of sensor, printer and laws with history are not offered."""
@@ -282,6 +282,7 @@ class MU_PG_freedom(bpy.types.PropertyGroup):
     )
 
 
+@property_of(bpy.types.Object, "mu_optimize")
 class MU_PG_optimize(bpy.types.PropertyGroup):
     """Targets and freedoms of a unit, and settings of the search."""
 
@@ -293,12 +294,7 @@ class MU_PG_optimize(bpy.types.PropertyGroup):
             ("file", "In a File", "Those of a design.toml"),
         ],
     )
-    file: StringProperty(
-        name="File",
-        description="design.toml with targets and freedoms",
-        subtype="FILE_PATH",
-        options=BESIDE_BLEND_FILE,
-    )
+    file: path_property("File", "design.toml with targets and freedoms")
     own_unit: BoolProperty(
         name="Start from This Unit",
         description="The search starts from this unit in place of the one that the file names",
@@ -320,8 +316,3 @@ class MU_PG_optimize(bpy.types.PropertyGroup):
     evaluations: blender_property(EVALUATIONS, name="Units at Most")
     refine: blender_property(SEARCH_REFINE, name="Search Mesh", precision=2, step=5)
     check_refine: blender_property(CHECK_REFINE, name="Check Mesh", precision=2, step=5)
-
-
-register, unregister = property_group_factory(
-    bpy.types.Object, "mu_optimize", (MU_PG_target, MU_PG_freedom, MU_PG_optimize)
-)

@@ -13,7 +13,7 @@ from bpy_extras.view3d_utils import location_3d_to_region_2d
 from ..results import field_colours, legend
 from ..results import motion as motion_parts
 from ..shared.displays import PART
-from ..shared.viewports import Overlay
+from ..shared.registration import overlay
 from ..shared.wording import path_symbol
 from ..unit import object as unit_object
 from . import ranking
@@ -53,6 +53,7 @@ def label(root: Any, known: ranking.Known, name: str) -> list[str]:
     return found
 
 
+@overlay
 def _draw() -> None:
     context = bpy.context
     root, tubes = _subject(context)
@@ -109,7 +110,3 @@ def seen(root: Any) -> list[tuple[str, Any]]:
         for part, child in found
         if part.startswith(CANDIDATE) and child.visible_get() and len(child.data.vertices)
     ]
-
-
-_overlay = Overlay(_draw)
-register, unregister = _overlay.register, _overlay.unregister

@@ -18,9 +18,9 @@ from bpy_extras.view3d_utils import location_3d_to_region_2d
 from gpu_extras.batch import batch_for_shader
 from mathutils import Vector
 
-from ..shared import viewports
+from ..shared import displays, viewports
 from ..shared.displays import LEGEND
-from ..shared.viewports import Overlay
+from ..shared.registration import overlay
 from ..simulate import study_folder as studies
 from ..unit import object as unit_object
 from . import field_colours, places
@@ -106,6 +106,7 @@ def lines(root: Any, motion: Any, scene: Any) -> list[str]:
     return found
 
 
+@overlay
 def _draw() -> None:
     context = bpy.context
     root = subject(context)
@@ -115,7 +116,7 @@ def _draw() -> None:
     shown = places.seen(root)
     scale = context.preferences.system.ui_scale
     size = round(12 * scale)
-    in_scene = any(child.get(LEGEND) and child.visible_get() for child in root.children)
+    in_scene = any(part.visible_get() for part in displays.parts(root, LEGEND))
     if not in_scene:
         texts = lines(root, motion, context.scene)
         place = room(context, len(texts))
@@ -255,7 +256,3 @@ def write(text: str, x: float, y: float, size: int, colour: tuple[float, ...] = 
     blf.position(0, x, y, 0)
     blf.draw(0, text)
     blf.disable(0, blf.SHADOW)
-
-
-_overlay = Overlay(_draw)
-register, unregister = _overlay.register, _overlay.unregister

@@ -18,6 +18,8 @@ from .wording import choice_label, label, tooltip
 
 MILLIMETRES = "DISTANCE_CAMERA"
 """Subtype of a property that is in millimetres in any scene."""
+BESIDE_BLEND_FILE = {"PATH_SUPPORTS_BLEND_RELATIVE"}
+"""Options of a path that may be relative to the .blend file."""
 MOST_INT = 2**31 - 1
 """The largest whole number of a property in Blender."""
 
@@ -65,3 +67,11 @@ def step_of(high_mm: float) -> int:
 def millimetres(step: float, **shared):
     """A property in true millimetres; step: change in hundredths of one by a drag of a pixel."""
     return FloatProperty(subtype=MILLIMETRES, precision=3, step=step, **shared)
+
+
+def path_property(name: str, description: str, folder: bool = False, **more):
+    """A property that is the path of a file or a folder, relative to the .blend file if the user wants it."""
+    subtype = "DIR_PATH" if folder else "FILE_PATH"
+    return StringProperty(
+        name=name, description=description, subtype=subtype, options=BESIDE_BLEND_FILE, **more
+    )

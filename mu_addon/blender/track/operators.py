@@ -7,6 +7,7 @@ from pathlib import Path
 import bpy
 from bpy.props import StringProperty
 
+from ...errors import InputError
 from ...usecases.track_video.run import console_summary, figures, filmed, read_pressure, write_experiment
 from ..shared.operators import reports_errors
 from ..unit import object as unit_object
@@ -24,7 +25,6 @@ def clip_of(context):
 class MU_OT_track(bpy.types.Operator):
     """Track the selected markers, or all, from this frame to the end of the clip"""
 
-    bl_idname = "mu.track"
     bl_label = "Track Markers"
     bl_options = {"REGISTER", "UNDO"}
 
@@ -59,7 +59,6 @@ class MU_OT_track(bpy.types.Operator):
 class MU_OT_track_write(bpy.types.Operator):
     """Write angle, positions and pressure over time into a folder of measured data"""
 
-    bl_idname = "mu.track_write"
     bl_label = "Write Measured Data"
     bl_options = {"REGISTER", "UNDO"}
 
@@ -81,8 +80,7 @@ class MU_OT_track_write(bpy.types.Operator):
     def execute(self, context):
         clip = bpy.data.movieclips.get(self.clip) if self.clip else clip_of(context)
         if clip is None:
-            self.report({"ERROR"}, f"There is no clip {self.clip!r}" if self.clip else NO_CLIP)
-            return {"CANCELLED"}
+            raise InputError(f"There is no clip {self.clip!r}" if self.clip else NO_CLIP)
         described, name = bench.bench_of(clip), bench.title(clip)
         pressure = read_pressure(Path(bpy.path.abspath(clip.mu_bench.pressure)))
         found = filmed(tracking.tracks_of(clip), described, pressure, clip.name)
@@ -95,9 +93,3 @@ class MU_OT_track_write(bpy.types.Operator):
         if root is not None and not root.mu_evidence.folder:
             root.mu_evidence.folder = clip.mu_bench.folder
         return {"FINISHED"}
-
-
-CLASSES = (MU_OT_track, MU_OT_track_write)
-
-
-register, unregister = bpy.utils.register_classes_factory(CLASSES)

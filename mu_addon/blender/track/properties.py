@@ -18,9 +18,8 @@ from ...errors import InputError
 from ...measured.kinds import ROLES
 from ...measured.video import View
 from ...usecases.track_video.run import Bench, MarkerSettings
-from ..shared.blender_property import exact
-from ..shared.registration import property_group_factory
-from ..unit.properties import BESIDE_BLEND_FILE
+from ..shared.blender_property import exact, path_property
+from ..shared.registration import property_of
 
 
 def _track(name: str, description: str):
@@ -36,6 +35,7 @@ def _place(name: str):
     )
 
 
+@property_of(bpy.types.MovieClip, "mu_bench")
 class MU_PG_bench(bpy.types.PropertyGroup):
     """Setup of a video: the object, the view, and the markers."""
 
@@ -102,17 +102,11 @@ class MU_PG_bench(bpy.types.PropertyGroup):
         description="Time of the pressure's record at the clip's first frame",
         precision=3,
     )
-    pressure: StringProperty(
-        name="Pressure",
-        description="CSV file of time_s,pressure_kPa: a recording, or the protocol that was played",
-        subtype="FILE_PATH",
-        options=BESIDE_BLEND_FILE,
+    pressure: path_property(
+        "Pressure", "CSV file of time_s,pressure_kPa: a recording, or the protocol that was played"
     )
-    folder: StringProperty(
-        name="Measured Data",
-        description="Folder that gets the experiment; other clips may be in it already",
-        subtype="DIR_PATH",
-        options=BESIDE_BLEND_FILE,
+    folder: path_property(
+        "Measured Data", "Folder that gets the experiment; other clips may be in it already", folder=True
     )
     title: StringProperty(name="Experiment", description="Name of the experiment. Empty: the clip's")
     role: EnumProperty(
@@ -195,6 +189,3 @@ def _pair(values: Any) -> tuple[float, float]:
 def title(clip: Any) -> str:
     """Name of the experiment made from a clip."""
     return clip.mu_bench.title or Path(clip.name).stem
-
-
-register, unregister = property_group_factory(bpy.types.MovieClip, "mu_bench", (MU_PG_bench,))

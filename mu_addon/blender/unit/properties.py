@@ -24,14 +24,13 @@ from ...design.quantity import Description, describe
 from ...fem.device import DEVICE
 from ...meshing.settings import REFINE, SELF_CONTACT
 from ...usecases.simulate_and_place.settings import ALL_PATHS, ORIENTATION, PATHS, PROTOCOL, SELF_FRICTION
-from ..shared.blender_property import blender_property, exact
-from ..shared.registration import property_group_factory
+from ..shared.blender_property import BESIDE_BLEND_FILE, blender_property, exact, path_property
+from ..shared.registration import property_of
 from ..shared.updates import Signal
 from .fields import generated_fields, tied
 
 PARAMETERS_CHANGED, VIEW_CHANGED = Signal(), Signal()
 """Sent with the root whose parameters changed, and with the root whose displayed parts changed."""
-BESIDE_BLEND_FILE = {"PATH_SUPPORTS_BLEND_RELATIVE"}
 
 
 def _changed(group, context):
@@ -101,11 +100,10 @@ class MU_PG_study(bpy.types.PropertyGroup):
     run_design: StringProperty(options={"HIDDEN"})
     # The run that the shown one is compared with.
     against: StringProperty(options={"HIDDEN"})
-    folder: StringProperty(
-        name="Study Folder",
-        description="Folder of this unit's runs. Empty: beside the .blend file, or the user's folder",
-        subtype="DIR_PATH",
-        options=BESIDE_BLEND_FILE,
+    folder: path_property(
+        "Study Folder",
+        "Folder of this unit's runs. Empty: beside the .blend file, or the user's folder",
+        folder=True,
     )
 
 
@@ -136,6 +134,7 @@ def title_property(noun: str):
     return StringProperty(name="Name", description=text, get=read, set=write)
 
 
+@property_of(bpy.types.Object, "mu_unit")
 class MU_PG_unit(bpy.types.PropertyGroup):
     """One Monolithic Unit, kept on its root object."""
 
@@ -188,7 +187,7 @@ class MU_PG_unit(bpy.types.PropertyGroup):
     }
 
 
-CLASSES = (*GROUPS.values(), MU_PG_study, MU_PG_step, MU_PG_unit)
+CLASSES = (*GROUPS.values(),)
 
 
 def section_of(props, section: str) -> dict:
@@ -226,6 +225,3 @@ def from_unit(props, unit: Unit) -> None:
 
 def _value(d: Description, value):
     return exact(value) if d.type is float else value
-
-
-register, unregister = property_group_factory(bpy.types.Object, "mu_unit", CLASSES)

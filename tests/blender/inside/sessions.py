@@ -71,10 +71,10 @@ def leave_a_simulation():
     uuid = root.mu_unit.uuid
     child = launch(root, "hang")
     watch(lambda: child.progress)
-    assert bpy.app.timers.is_registered(jobs._poll)
+    assert bpy.app.timers.is_registered(jobs._poll.function)
     bpy.ops.wm.read_homefile(use_empty=True)
     assert jobs.running() == [f"{uuid}:simulate"]
-    assert bpy.app.timers.is_registered(jobs._poll)
+    assert bpy.app.timers.is_registered(jobs._poll.function)
     add()
     assert "other job" in drawn()
     return child._process.pid
@@ -97,7 +97,7 @@ def leave_a_lasting_run():
     )
     jobs.watch(key, child, "arm: simulation")
     watch(lambda: child.progress)
-    assert jobs.goes_on(key)
+    assert jobs._jobs[key].goes_on
     bpy.ops.wm.save_as_mainfile(filepath="arm.blend")
     return child.pid, folder
 
@@ -107,7 +107,7 @@ def find_a_lasting_run():
     begin()
     jobs._take_up()
     (key,) = jobs.running()
-    assert jobs.title_of(key) == "arm: simulation"
+    assert jobs._jobs[key].title == "arm: simulation"
     bpy.ops.wm.open_mainfile(filepath="arm.blend")
     (root,) = unit_object.roots()
     child = SIMULATION.child(root)
@@ -149,11 +149,11 @@ def leave_a_sensor(tmp_path):
     watch_sensor(lambda: s.watched.status["rows"] > rows + 20)
     sensor._render_ended()
 
-    assert bpy.app.timers.is_registered(sensor._poll)
+    assert bpy.app.timers.is_registered(sensor._poll.function)
     bpy.ops.wm.save_as_mainfile(filepath=str(tmp_path / "study" / "seat.blend"))
     bpy.ops.wm.read_homefile(use_empty=True)
     assert s.running
-    assert bpy.app.timers.is_registered(sensor._poll)
+    assert bpy.app.timers.is_registered(sensor._poll.function)
     before = s.watched.status["rows"]
     watch_sensor(lambda: s.watched.status["rows"] > before + 10)
     add()

@@ -174,7 +174,7 @@ def test_several_faults_have_a_button_each_that_says_what_it_sets_and_one_for_al
     lines, _ = figures.lines(root, 36)
     assert "odd count: 3 or 5" in " ".join(lines), "the remedy is never cut"
     root.mu_unit.chambers.neck_diameter_mm = 30.0
-    words = drawn(unit_panel.CLASSES)
+    words = drawn(unit_panel)
     assert "Neck Ø 24 mm Cells X 3 All 2" in words
     assert broken(root).blames(["lattice"]), "the closed panel's header is marked"
     assert not broken(root).blames(["waveguide"])
@@ -196,7 +196,7 @@ def test_three_faults_have_three_buttons_and_what_mends_nothing_is_not_red():
     assert ("lattice", "junction_diameter_mm") not in broken(root).fits, "the struts break no rule"
     root.mu_unit.lattice.cells_x = 4
     root.mu_unit.chambers.neck_diameter_mm = 30.0
-    words = drawn(unit_panel.CLASSES)
+    words = drawn(unit_panel)
     assert "Neck Ø 24 mm Cells X 3" in words
     for repair in broken(root).repairs:
         d = description(repair.section, repair.name)
