@@ -9,6 +9,7 @@ from ...design.anchors import farthest_window, windows
 from ...design.gripper import gripper_names, load_gripper
 from ..jobs.operators import job_operators
 from ..shared import landing, viewports
+from ..shared.blender_property import listed
 from ..shared.operators import FreeOperator, RootOperator, operator
 from ..unit.object import active_root
 from ..unit.properties import to_unit
@@ -18,20 +19,16 @@ from . import timeline
 
 NO_GRIPPER = "Select a Monolithic Gripper, or add one: Add > Mesh > Monolithic Gripper"
 
-_items: list[tuple[str, str, str]] = []
 
-
-def _preset_items(self, context):
-    # Blender does not keep these strings alive; this list does.
-    _items[:] = [(name, name.capitalize(), "") for name in gripper_names()]
-    return _items
+def _presets() -> list[tuple[str, str, str]]:
+    return [(name, name.capitalize(), "") for name in gripper_names()]
 
 
 @operator(
     FreeOperator,
     "Monolithic Gripper",
     preset=EnumProperty(
-        name="Preset", description="Gripper to begin with", items=_preset_items, options={"SKIP_SAVE"}
+        name="Preset", description="Gripper to begin with", items=listed(_presets), options={"SKIP_SAVE"}
     ),
     of_unit=BoolProperty(
         name="Of the Active Unit",

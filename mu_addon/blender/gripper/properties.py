@@ -17,7 +17,7 @@ from ..shared import displays
 from ..shared.blender_property import MILLIMETRES, blender_property, exact, millimetres, path_property
 from ..shared.registration import property_of
 from ..shared.updates import Signal
-from ..unit.fields import generated_fields, path_menu
+from ..unit.fields import generated_group, path_menu, set_sections
 from ..unit.properties import title_property
 
 PARAMETERS_CHANGED = Signal()
@@ -28,16 +28,7 @@ def _changed(group, context):
     PARAMETERS_CHANGED.send(group.id_data)
 
 
-def _generated(section: type):
-    annotations = generated_fields(section, _changed)
-    return type(
-        f"MU_PG_gripper_{section.section}",
-        (bpy.types.PropertyGroup,),
-        {"__annotations__": annotations, "__doc__": section.__doc__},
-    )
-
-
-GROUPS = {section.section: _generated(section) for section in SECTIONS}
+GROUPS = {s.section: generated_group(s, _changed, "MU_PG_gripper_") for s in SECTIONS}
 
 
 @lru_cache(maxsize=32)
@@ -133,7 +124,4 @@ def from_gripper(props, gripper: Gripper) -> None:
     """Set the properties to a gripper; each still calls its update, see `updates.paused`."""
     props.finger = parameters.to_toml(gripper.unit, comments=False)
     props.title, props.path = gripper.name, gripper.path
-    for section in SECTIONS:
-        group, values = getattr(props, section.section), getattr(gripper, section.section)
-        for d in describe(section):
-            setattr(group, d.name, getattr(values, d.name))
+    set_sections(props, SECTIONS, gripper)

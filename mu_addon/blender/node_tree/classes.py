@@ -240,22 +240,16 @@ def _property(s: Setting):
 def _annotations(definition: Definition) -> dict:
     found = {attribute(s): _property(s) for s in definition.settings}
     if any(not s.shown for s in definition.settings):
-        found["source"] = PointerProperty(
-            name="Unit in the Scene",
-            description="Take this unit, as its sidebar has it, in place of preset and file",
-            type=bpy.types.Object,
-            poll=_is_unit,
-            update=_changed,
-        )
+        text = "Take this unit, as its sidebar has it, in place of preset and file"
+        found["source"] = _unit_of_scene("Unit in the Scene", text)
     if any(o.type == "unit" for o in definition.outputs):
-        found["follower"] = PointerProperty(
-            name="Show On",
-            description="Unit in the scene that takes on every change of this node's unit",
-            type=bpy.types.Object,
-            poll=_is_unit,
-            update=_changed,
-        )
+        text = "Unit in the scene that takes on every change of this node's unit"
+        found["follower"] = _unit_of_scene("Show On", text)
     return found
+
+
+def _unit_of_scene(name: str, text: str):
+    return PointerProperty(name=name, description=text, type=bpy.types.Object, poll=_is_unit, update=_changed)
 
 
 def _class(definition: Definition) -> type:

@@ -15,6 +15,7 @@ from ...usecases.graph import templates
 from ...usecases.graph.definitions import definitions
 from ..jobs import start_child
 from ..jobs.operators import job_operators
+from ..shared.blender_property import listed
 from ..shared.operators import FreeOperator, open_file, operator, reports_errors
 from ..shared.wording import sentence
 from ..unit.base_classes import UnitOperator
@@ -79,29 +80,23 @@ def tree_evaluate(context, tree, node):
     state.start(tree, (node,) if node else ())
 
 
+def _templates() -> list[tuple[str, str, str]]:
+    names = sorted(templates.template_names(), key=lambda name: [*_TEXTS, name].index(name))
+    return [(n, sentence(n.replace("-", " ")), _TEXTS.get(n, n)) for n in names]
+
+
 @operator(
     FreeOperator,
     "New from Template",
     template=EnumProperty(
         name="Template",
         description="Initial nodes of the tree",
-        items=lambda self, context: _items(),
+        items=listed(_templates),
     ),
 )
 def tree_new(context, template):
     """Add a node tree made from a template"""
     _open(context, conversion.from_tree(templates.template(template)))
-
-
-_template_items: list = []
-
-
-def _items():
-    # Blender keeps no reference to the texts of items.
-    if not _template_items:
-        names = sorted(templates.template_names(), key=lambda name: [*_TEXTS, name].index(name))
-        _template_items.extend((n, sentence(n.replace("-", " ")), _TEXTS.get(n, n)) for n in names)
-    return _template_items
 
 
 class MU_OT_tree_load(bpy.types.Operator):

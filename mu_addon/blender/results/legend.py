@@ -86,7 +86,6 @@ def lines(root: Any, motion: Any, scene: Any) -> list[str]:
     """
     field = field_colours.BY_NAME[root.mu_motion.field]
     time = motion_parts.time_of(motion, scene)
-    pressure = float(np.interp(time, motion.time_s, motion.pressure_kPa))
     found = [field.title]
     if root != unit_object.active_root(bpy.context):
         found.insert(0, root.name)
@@ -94,7 +93,7 @@ def lines(root: Any, motion: Any, scene: Any) -> list[str]:
     if field.name == motion_parts.DIFFERENCE and other is not None:
         itself = other.folder == motion.folder.parent
         found.append("the run compared with itself" if itself else f"to the run {other.title}")
-    found.append(f"{np.clip(time, motion.time_s[0], motion.time_s[-1]):.2f} s, {pressure + 0.0:.1f} kPa")
+    found.append(motion_parts.moment(motion, scene))
     for contact in studies.contact_forces(root):
         force = float(np.interp(time, contact.time_s, contact.force_N))
         found.append(f"{contact.name}: {force:.2f} N")
@@ -135,9 +134,7 @@ def above(texts: Sequence[str], place: Room) -> None:
 
 def subject(context: Any) -> Any | None:
     """Unit of the legend: the active one, or another if that shows none."""
-    active = unit_object.active_root(context)
-    every = [active, *(root for root in unit_object.roots() if root != active)]
-    return next((root for root in every if root is not None and places.seen(root)), None)
+    return unit_object.first_that(context, places.seen)
 
 
 def beside_tools(area: Any) -> float:

@@ -314,6 +314,13 @@ def time_of(motion: Motion, scene: Any) -> float:
     return float(motion.time_s[0] + timeline.seconds_at(scene))
 
 
+def moment(motion: Motion, scene: Any) -> str:
+    """Time of the protocol and its pressure at the scene's frame, as text."""
+    time = float(np.clip(time_of(motion, scene), motion.time_s[0], motion.time_s[-1]))
+    pressure = float(np.interp(time, motion.time_s, motion.pressure_kPa))
+    return f"{time:.2f} s, {pressure + 0.0:.1f} kPa"
+
+
 def frame_of(motion: Motion, time_s: float, scene: Any) -> int:
     """The scene's first frame at or after a time of the protocol."""
     return int(np.ceil(timeline.frames_at(scene, time_s - float(motion.time_s[0])) - 1e-6))

@@ -42,9 +42,7 @@ def lines(root: Any, place: places.Place, scene: Any) -> list[str]:
         x, y, z = (float(v) + 0.0 for v in np.round(at, 2))
         found.append(f"{what}: x {x:.1f}, y {y:.1f}, z {z:.1f} mm")
     if motion is not None:
-        time = float(np.clip(motion_parts.time_of(motion, scene), motion.time_s[0], motion.time_s[-1]))
-        pressure = float(np.interp(time, motion.time_s, motion.pressure_kPa))
-        found.append(f"{whose}, {time:.2f} s, {pressure + 0.0:.1f} kPa")
+        found.append(f"{whose}, {motion_parts.moment(motion, scene)}")
     return found
 
 

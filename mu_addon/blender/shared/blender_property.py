@@ -8,6 +8,8 @@ metric units when typed; fields of lengths here use that subtype.
 # Blender reads the annotations themselves: no `from __future__ import annotations` here.
 
 import textwrap
+from collections.abc import Callable
+from typing import Any
 from zlib import crc32
 
 import numpy as np
@@ -75,3 +77,16 @@ def path_property(name: str, description: str, folder: bool = False, **more):
     return StringProperty(
         name=name, description=description, subtype=subtype, options=BESIDE_BLEND_FILE, **more
     )
+
+
+def listed(
+    make: Callable[[], list[tuple[str, str, str]]],
+) -> Callable[[Any, Any], list[tuple[str, str, str]]]:
+    """Items of a menu that are made anew each time it opens; Blender does not keep their strings alive."""
+    kept: list[tuple[str, str, str]] = []
+
+    def items(owner: Any, context: Any) -> list[tuple[str, str, str]]:
+        kept[:] = make()
+        return kept
+
+    return items

@@ -69,6 +69,13 @@ def _of_gripper(obj: Any | None) -> bool:
     return obj is not None
 
 
+def first_that(context: Any, shows: Any) -> Any | None:
+    """The active unit, or else another one, of which `shows` is true; None without any."""
+    active = active_root(context)
+    every = [active, *(root for root in roots() if root != active)]
+    return next((root for root in every if root is not None and shows(root)), None)
+
+
 def by_uuid(name: str) -> Any | None:
     """The unit of that UUID, or None where it was deleted."""
     return next((o for o in roots() if o.mu_unit.uuid == name), None)

@@ -12,7 +12,7 @@ from ...design.repairs import tied
 from ...design.settings import PRESET
 from ...errors import InputError
 from ..shared import landing, scene_units, updates, viewports
-from ..shared.blender_property import exact
+from ..shared.blender_property import exact, listed
 from ..shared.operators import FreeOperator, operator, reports_errors
 from ..shared.wording import label, tooltip
 from . import object as unit_object
@@ -37,16 +37,11 @@ def _use_millimetres(context) -> None:
     scene_units.CHANGED.send(context.scene)
 
 
-_items: list[tuple[str, str, str]] = []
-
-
-def _preset_items(self, context):
-    # Blender does not keep these strings alive; this list does.
-    _items[:] = [
+def _presets() -> list[tuple[str, str, str]]:
+    return [
         (n, n.removeprefix(presets.USER), "Your own" if n.startswith(presets.USER) else "")
         for n in presets.names()
     ]
-    return _items
 
 
 class MU_OT_add(bpy.types.Operator):
@@ -56,7 +51,7 @@ class MU_OT_add(bpy.types.Operator):
     bl_options = {"REGISTER", "UNDO"}
 
     preset: EnumProperty(
-        name="Preset", description="Unit to begin with", items=_preset_items, options={"SKIP_SAVE"}
+        name="Preset", description="Unit to begin with", items=listed(_presets), options={"SKIP_SAVE"}
     )
     scale: FloatProperty(
         name="Scale",

@@ -27,7 +27,7 @@ from ...usecases.simulate_and_place.settings import ALL_PATHS, ORIENTATION, PATH
 from ..shared.blender_property import BESIDE_BLEND_FILE, blender_property, exact, path_property
 from ..shared.registration import property_of
 from ..shared.updates import Signal
-from .fields import generated_fields, tied
+from .fields import generated_group, set_sections, tied
 
 PARAMETERS_CHANGED, VIEW_CHANGED = Signal(), Signal()
 """Sent with the root whose parameters changed, and with the root whose displayed parts changed."""
@@ -44,15 +44,7 @@ def _candidates_changed(unit, context):
     PARAMETERS_CHANGED.send(unit.id_data)
 
 
-def _generated(section: type):
-    annotations = generated_fields(section, _changed)
-    name = f"MU_PG_{section.section}"
-    return type(
-        name, (bpy.types.PropertyGroup,), {"__annotations__": annotations, "__doc__": section.__doc__}
-    )
-
-
-GROUPS = {section.section: _generated(section) for section in SECTIONS}
+GROUPS = {section.section: generated_group(section, _changed) for section in SECTIONS}
 _HEAD = {d.name: d for d in describe(Unit)}
 
 
@@ -217,10 +209,7 @@ def shape_hash(unit: Unit) -> str:
 def from_unit(props, unit: Unit) -> None:
     """Set Blender's properties to a unit; each still calls its update, see `updates.paused`."""
     props.title, props.scale = unit.name, unit.scale
-    for section in SECTIONS:
-        group, values = getattr(props, section.section), getattr(unit, section.section)
-        for d in describe(section):
-            setattr(group, d.name, getattr(values, d.name))
+    set_sections(props, SECTIONS, unit)
 
 
 def _value(d: Description, value):

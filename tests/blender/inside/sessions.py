@@ -73,7 +73,7 @@ def leave_a_simulation():
     watch(lambda: child.progress)
     assert bpy.app.timers.is_registered(jobs._poll.function)
     bpy.ops.wm.read_homefile(use_empty=True)
-    assert jobs.running() == [f"{uuid}:simulate"]
+    assert [job.key for job in jobs.running()] == [f"{uuid}:simulate"]
     assert bpy.app.timers.is_registered(jobs._poll.function)
     add()
     assert "other job" in drawn()
@@ -90,12 +90,12 @@ def leave_a_lasting_run():
     own = folder / jobs.OWN_FOLDER
     child = Child([sys.executable, LOCKED, str(folder)], own, environment([ROOT]))
     key = SIMULATION.key(root)
-    jobs.last(
+    jobs.lasting_jobs.keep(
         jobs.lasting_jobs.Record(
             key, "arm: simulation", folder, jobs.lasting_jobs.now_s(), (("Model A", 9.0),), True
         )
     )
-    jobs.watch(key, child, "arm: simulation")
+    jobs.watch(key, child, "arm: simulation", heavy=True, lasts=True)
     watch(lambda: child.progress)
     assert jobs._jobs[key].goes_on
     bpy.ops.wm.save_as_mainfile(filepath="arm.blend")
@@ -106,8 +106,9 @@ def find_a_lasting_run():
     """The next session finds it, with its unit or without, and stops it; returns how it ended."""
     begin()
     jobs._take_up()
-    (key,) = jobs.running()
-    assert jobs._jobs[key].title == "arm: simulation"
+    (job,) = jobs.running()
+    key = job.key
+    assert job.title == "arm: simulation"
     bpy.ops.wm.open_mainfile(filepath="arm.blend")
     (root,) = unit_object.roots()
     child = SIMULATION.child(root)
@@ -115,7 +116,7 @@ def find_a_lasting_run():
     assert child.estimate.number == 1
     assert "is being simulated" in refused(bpy.ops.mu.simulate) or not bpy.ops.mu.simulate.poll()
     jobs._take_up()
-    assert jobs.running() == [key], "found once"
+    assert jobs.running() == [jobs._jobs[key]], "found once"
     assert bpy.ops.mu.job_cancel(key=key) == {"FINISHED"}
     watch(lambda: child.state != "running")
     mu_addon.unregister()
