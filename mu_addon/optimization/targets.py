@@ -23,33 +23,14 @@ from .quantities import (
 )
 from .sensor_quantities import Disturbance, SensorSlope
 from .structure import Quantity
+from .target_kinds import GAP, KINDS, PRESSURE
 from .unit_quantities import Mass, PrintTime, WallThickness
 
 Goal = Literal["minimise", "maximise"]
 
-# Keys of each kind besides those of `_FORM`, and the unit of its value.
-KINDS: dict[str, tuple[tuple[str, ...], str]] = {
-    "angle": (("pressure_kPa",), "deg"),
-    "tip_force": (("pressure_kPa", "gap_mm"), "N"),
-    "tip_position": (("pressure_kPa", "direction"), "mm"),
-    "workspace": (("pressures_kPa",), "mm"),
-    "stiffness": (("direction",), "N/mm"),
-    "stretch": (("pressure_kPa", "region"), ""),
-    "safety": (("pressure_kPa", "region"), ""),
-    "air_volume": (("pressure_kPa",), "ml"),
-    "mass": ((), "g"),
-    "print_time": ((), "h"),
-    "wall_thickness": ((), "mm"),
-    "deviation": (("pressures_kPa", "path"), "mm"),
-    "sensor_slope": (("pressures_kPa", "path"), "1/deg"),
-    "walls_apart": (("pressure_kPa",), ""),
-    "printable": ((), ""),
-}
 _FORM = ("kind", "name", "value", "tolerance", "low", "high", "objective", "points")
 NARROW = 0.02
 """One unit of misfit of a bound without a tolerance, as a share of the bound."""
-HIGHEST_kPa = 500.0
-FARTHEST_WALL_MM = 200.0
 
 
 @attrs.frozen
@@ -98,7 +79,7 @@ class Target:
     def words(self) -> str:
         """The target as text."""
         unit = f" {self.unit}" if self.unit else ""
-        if self.kind in ("walls_apart", "printable"):
+        if KINDS[self.kind].is_yes:
             return "yes"
         if self.goal is not None:
             return "as small as possible" if self.goal == "minimise" else "as large as possible"
@@ -170,7 +151,7 @@ def _targets(table: Mapping[str, Any], where: str, supplies: Supplies) -> list[T
         raise InputError(
             f"kind = {kind!r} is not known{hint}", f"{where}, kind", f"one of: {', '.join(KINDS)}"
         )
-    known = (*_FORM, *KINDS[kind][0])
+    known = (*_FORM, *KINDS[kind].takes)
     for key in table:
         if key not in known:
             raise InputError(
@@ -183,10 +164,10 @@ def _targets(table: Mapping[str, Any], where: str, supplies: Supplies) -> list[T
     if not isinstance(name, str) or not name.strip() or len(name) > 60 or not name.isprintable():
         raise InputError(f"name = {name!r} is not a name", f"{where}, name", "write a short text in quotes")
     quantity = _quantity(kind, name, table, where, supplies)
-    if kind in ("walls_apart", "printable"):
+    if KINDS[kind].is_yes:
         _refuse(table, ("value", "tolerance", "low", "high", "objective"), where, f"{kind} is a yes or a no")
         return [Target(name, kind, "", quantity, tolerance=1.0, low=1.0, line=where)]
-    return [Target(name, kind, KINDS[kind][1], quantity, **_asked(table, where, kind), line=where)]
+    return [Target(name, kind, KINDS[kind].unit, quantity, **_asked(table, where, kind), line=where)]
 
 
 def _name(kind: str, table: Mapping[str, Any]) -> str:
@@ -245,7 +226,7 @@ def _curve(table: Mapping[str, Any], where: str, supplies: Supplies) -> list[Tar
         raise InputError(
             f"points = {points!r} is not a curve", f"{where}, points", "write [[-15, -20], [30, 40]]"
         )
-    if "pressure_kPa" not in KINDS[table["kind"]][0]:
+    if "pressure_kPa" not in KINDS[table["kind"]].takes:
         raise InputError(f"{table['kind']} has no curve", f"{where}, points", "give a value")
     _refuse(table, ("value", "low", "high", "objective", "pressure_kPa"), where, "points give it already")
     rest = {key: v for key, v in table.items() if key not in ("points", "name")}
@@ -322,9 +303,9 @@ def _tip_force(name: str, pressure: float, table: Mapping[str, Any], where: str)
             "the wall is on the side toward which pressure bends the unit", f"{where}, pressure_kPa",
             "give a pressure above 0",
         )  # fmt: skip
-    if not 0 <= gap <= FARTHEST_WALL_MM:
+    if not 0 <= gap <= GAP.high:
         raise InputError(
-            f"gap_mm = {gap:g} is out of bounds", f"{where}, gap_mm", f"give 0 to {FARTHEST_WALL_MM:g} mm"
+            f"gap_mm = {gap:g} is out of bounds", f"{where}, gap_mm", f"give 0 to {GAP.high:g} mm"
         )
     return TipForce(name, pressure, gap)
 
@@ -350,10 +331,10 @@ def _pressures(table: Mapping[str, Any], where: str) -> tuple[float, ...]:
 
 def _pressure(table: Mapping[str, Any], where: str) -> float:
     found = _number(table, "pressure_kPa", where)
-    if abs(found) > HIGHEST_kPa:
+    if abs(found) > PRESSURE.high:
         raise InputError(
             f"pressure_kPa = {found:g} is out of bounds", f"{where}, pressure_kPa",
-            f"give {-HIGHEST_kPa:g} to {HIGHEST_kPa:g} kPa",
+            f"give {-PRESSURE.high:g} to {PRESSURE.high:g} kPa",
         )  # fmt: skip
     return found
 

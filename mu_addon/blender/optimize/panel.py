@@ -7,6 +7,7 @@ import re
 import bpy
 
 from ...optimization.freedoms import parameters
+from ...optimization.target_kinds import KINDS
 from ...studies.optimize import FRONT
 from ..jobs.panel import draw_job, open_buttons, timed
 from ..shared.file_cache import icon_of
@@ -14,12 +15,9 @@ from ..shared.panels import alert, fold, wrapped
 from ..shared.wording import in_panel, label
 from ..unit.base_classes import UnitPanel
 from . import state as optimization
-from .properties import ASKED, AT_PRESSURE, AT_TWO, FREE, NAMED, OF_PATH, YES, asks_curve, present, scale_of
+from .properties import ASKED, FREE, NAMED, conditions, present, scale_of
 
 _KNOWN = parameters()
-UNITS = {"angle": "deg", "stiffness": "N/mm", "air_volume": "ml", "mass": "g", "print_time": "h"}
-UNITS |= {"deviation": "mm", "sensor_slope": "1/deg", "wall_thickness": "mm"}
-UNITS |= {"tip_force": "N", "tip_position": "mm", "workspace": "mm"}
 BARELY = "QUESTION"
 """Sign of a target that is met, but within two standard errors of being missed."""
 LABELS = 0.4
@@ -101,16 +99,9 @@ def _targets(layout, props) -> None:
         row.prop(target, "kind", text="")
         _remove(row, "targets", index)
         column = box.column(align=True)
-        if target.kind in AT_PRESSURE and not asks_curve(target):
-            column.prop(target, "pressure_kPa")
-        if target.kind in OF_PATH:
-            column.prop(target, "paths")
-        if target.kind in AT_TWO:
-            column.prop(target, "pressures_kPa")
-        own = {"stiffness": "direction", "tip_position": "toward", "tip_force": "gap_mm"}.get(target.kind)
-        if own:
-            column.prop(target, own)
-        if target.kind in YES:
+        for name in conditions(target).values():
+            column.prop(target, "paths" if name == "path" else name)
+        if KINDS[target.kind].is_yes:
             continue
         column.prop(target, "ask")
         for name in ASKED[target.ask]:
@@ -148,7 +139,7 @@ def _freedoms(layout, root, props) -> None:
 
 def asked_title(target, name: str) -> str:
     """Label next to a field of a target: its name and unit, for a curve the units of a pair."""
-    unit = UNITS.get(target.kind, "")
+    unit = KINDS[target.kind].unit
     if name == "points":
         return f"kPa: {unit or 'value'}"
     title = target.bl_rna.properties[name].name

@@ -14,6 +14,7 @@ from ...design.repairs import tied
 from ...errors import InputError, MuError
 from ...optimization.freedoms import Freedom, changed_unit
 from ...optimization.settings import BODY, DESIGN, HEADER, UNIT
+from ...optimization.target_kinds import KINDS
 from ...studies.inputs import MODEL
 from ...studies.optimize import Optimize, expected_s
 from ...toml_writer import toml_text
@@ -26,7 +27,7 @@ from ..simulate import study_folder as studies
 from ..simulate.study_job import StudyJob
 from ..unit import envelope
 from ..unit.properties import shape_hash, to_unit
-from .properties import ASKED, AT_PRESSURE, AT_TWO, FREE, NAMED, OF_PATH, YES, asks_curve
+from .properties import ASKED, FREE, NAMED, asks_curve, conditions
 
 FOLDER = "optimize"
 """Folder of the optimisation in the unit's study folder."""
@@ -100,28 +101,24 @@ OPTIMIZATION = JobKind(
 
 def target_table(target: Any) -> dict[str, Any]:
     """A target of the panel as its [[target]] table."""
-    table: dict[str, Any] = {"kind": target.kind}
-    if target.kind in OF_PATH and target.path:
-        table["path"] = target.path
-    if target.kind in AT_TWO:
-        table["pressures_kPa"] = [exact(p) for p in target.pressures_kPa]
-    if target.kind == "stiffness":
-        table["direction"] = target.direction
-    elif target.kind == "tip_position":
-        table["direction"] = target.toward
-    elif target.kind == "tip_force":
-        table["gap_mm"] = exact(target.gap_mm)
-    curve = asks_curve(target)
-    if target.kind in AT_PRESSURE and not curve:
-        table["pressure_kPa"] = exact(target.pressure_kPa)
-    if target.kind in YES:
+    given = {key: getattr(target, name) for key, name in conditions(target).items()}
+    # A path that is searched for is left out.
+    table = {"kind": target.kind} | {key: _plain(value) for key, value in given.items() if value != ""}
+    if KINDS[target.kind].is_yes:
         return table
-    if curve:
+    if asks_curve(target):
         points = [_numbers(pair, ":") for pair in target.points.split(",")]
         return table | {"points": points, "tolerance": exact(target.tolerance)}
     keys = ASKED[target.ask]
     asked = {key: exact(getattr(target, key)) for key in keys}
     return table | (asked if keys else {"objective": target.ask})
+
+
+def _plain(value: Any) -> Any:
+    """A property's value for a file: numbers by their shortest decimals."""
+    if isinstance(value, str):
+        return value
+    return exact(value) if isinstance(value, float) else [exact(v) for v in value]
 
 
 def _numbers(text: str, between: str) -> list[Any]:
