@@ -24,33 +24,14 @@ from .quantities import (
 )
 from .sensor_quantities import Disturbance, SensorSlope
 from .structure import Quantity
+from .target_kinds import GAP, KINDS, PRESSURE
 from .unit_quantities import Mass, PrintTime, WallThickness
 
 Goal = Literal["minimise", "maximise"]
 
-# Keys of each kind besides those of `_FORM`, and the unit of its value.
-KINDS: dict[str, tuple[tuple[str, ...], str]] = {
-    "angle": (("pressure_kPa",), "deg"),
-    "tip_force": (("pressure_kPa", "gap_mm"), "N"),
-    "tip_position": (("pressure_kPa", "direction"), "mm"),
-    "workspace": (("pressures_kPa",), "mm"),
-    "stiffness": (("direction",), "N/mm"),
-    "stretch": (("pressure_kPa", "region"), ""),
-    "safety": (("pressure_kPa", "region"), ""),
-    "air_volume": (("pressure_kPa",), "ml"),
-    "mass": ((), "g"),
-    "print_time": ((), "h"),
-    "wall_thickness": ((), "mm"),
-    "deviation": (("pressures_kPa", "path"), "mm"),
-    "sensor_slope": (("pressures_kPa", "path"), "1/deg"),
-    "walls_apart": (("pressure_kPa",), ""),
-    "printable": ((), ""),
-}
 _FORM = ("kind", "name", "value", "tolerance", "low", "high", "objective", "points")
 NARROW = 0.02
 """One unit of misfit of a bound without a tolerance, as a share of the bound."""
-HIGHEST_kPa = 500.0
-FARTHEST_WALL_MM = 200.0
 
 
 @attrs.frozen
@@ -99,7 +80,7 @@ class Target:
     def words(self) -> str:
         """The target as text."""
         unit = f" {self.unit}" if self.unit else ""
-        if self.kind in ("walls_apart", "printable"):
+        if KINDS[self.kind].is_yes:
             return "yes"
         if self.goal is not None:
             return "as small as possible" if self.goal == "minimise" else "as large as possible"
@@ -163,17 +144,17 @@ def _of_printer(printable: Target, supplies: Supplies) -> Target:
 
 def _targets(table: TomlTable, supplies: Supplies) -> list[Target]:
     kind = table.word("kind", tuple(KINDS))
-    table.only((*_FORM, *KINDS[kind][0]))
+    table.only((*_FORM, *KINDS[kind].takes))
     if "points" in table:
         return _curve(table, kind, supplies)
     name = table.word("name", default=_name(kind, table.values))
     if len(name) > 60 or not name.isprintable():
         raise InputError(f"name = {name!r} is not a name", table.at("name"), "write a short text in quotes")
     quantity = _quantity(kind, name, table, supplies)
-    if kind in ("walls_apart", "printable"):
+    if KINDS[kind].is_yes:
         _refuse(table, ("value", "tolerance", "low", "high", "objective"), f"{kind} is a yes or a no")
         return [Target(name, kind, "", quantity, tolerance=1.0, low=1.0, line=table.at())]
-    return [Target(name, kind, KINDS[kind][1], quantity, **_asked(table, kind), line=table.at())]
+    return [Target(name, kind, KINDS[kind].unit, quantity, **_asked(table, kind), line=table.at())]
 
 
 def _name(kind: str, table: Mapping[str, Any]) -> str:
@@ -222,7 +203,7 @@ def _curve(table: TomlTable, kind: str, supplies: Supplies) -> list[Target]:
     points = table.take("points", tuple[tuple[float, float], ...])
     if len(points) < 2:
         raise InputError("one point is no curve", table.at("points"), "write [[-15, -20], [30, 40]]")
-    if "pressure_kPa" not in KINDS[kind][0]:
+    if "pressure_kPa" not in KINDS[kind].takes:
         raise InputError(f"{kind} has no curve", table.at("points"), "give a value")
     _refuse(table, ("value", "low", "high", "objective", "pressure_kPa"), "points give it already")
     rest = {key: v for key, v in table.values.items() if key not in ("points", "name")}
@@ -286,7 +267,7 @@ def _quantity(kind: str, name: str, table: TomlTable, supplies: Supplies) -> Qua
 
 
 def _tip_force(name: str, pressure: float, table: TomlTable) -> TipForce:
-    gap = table.number("gap_mm", 0.0, FARTHEST_WALL_MM, 0.0)
+    gap = table.number("gap_mm", 0.0, GAP.high, 0.0)
     if pressure < 0:
         raise InputError(
             "the wall is on the side toward which pressure bends the unit", table.at("pressure_kPa"),
@@ -303,7 +284,7 @@ def _refuse(table: TomlTable, keys: Sequence[str], why: str) -> None:
 
 def _pressures(table: TomlTable) -> tuple[float, ...]:
     given = table.take("pressures_kPa", tuple[float, ...])
-    bounded = (table.bounded("pressures_kPa", p, -HIGHEST_kPa, HIGHEST_kPa) for p in given)
+    bounded = (table.bounded("pressures_kPa", p, PRESSURE.low, PRESSURE.high) for p in given)
     found = tuple(sorted({*bounded} - {0.0}))
     if not found:
         raise InputError("no pressure differs from 0", table.at("pressures_kPa"), "give one")
@@ -311,7 +292,7 @@ def _pressures(table: TomlTable) -> tuple[float, ...]:
 
 
 def _pressure(table: TomlTable) -> float:
-    return float(table.number("pressure_kPa", -HIGHEST_kPa, HIGHEST_kPa))
+    return float(table.number("pressure_kPa", PRESSURE.low, PRESSURE.high))
 
 
 def _number(table: TomlTable, key: str, default: Any = attrs.NOTHING) -> float:

@@ -21,12 +21,13 @@ from ...measured.folder import FILE
 from ...reading import file_bytes, file_text, parse_json, parse_toml
 from ...run.folder import write_run
 from ..jobs.start_child import JobKind
+from ..shared.blender_property import path_property
 from ..shared.file_cache import FileCache
-from ..shared.registration import property_group_factory
+from ..shared.registration import property_of
 from ..shared.wording import error_text
 from ..simulate import effects, timings
 from ..simulate import study_folder as studies
-from ..unit.properties import BESIDE_BLEND_FILE, shape_hash, to_unit
+from ..unit.properties import shape_hash, to_unit
 
 FOLDER = "evidence"
 """Folder of the diagnosis in the unit's study folder."""
@@ -40,14 +41,12 @@ NAMES |= {"unidentifiable": "Not identifiable", "unexplained": "Unexplained"}
 """Verdicts by their headings."""
 
 
+@property_of(bpy.types.Object, "mu_evidence")
 class MU_PG_evidence(bpy.types.PropertyGroup):
     """Measured data of a unit."""
 
-    folder: StringProperty(
-        name="Measured Data",
-        description="Folder with experiments.toml and the CSV files it names",
-        subtype="DIR_PATH",
-        options=BESIDE_BLEND_FILE,
+    folder: path_property(
+        "Measured Data", "Folder with experiments.toml and the CSV files it names", folder=True
     )
     # Last model given to the unit, the unit before it, and the changes in words.
     applied: StringProperty(options={"HIDDEN"})
@@ -109,7 +108,9 @@ def announced(root: Any) -> float | None:
     return timings.announced(_detail(e.kind for e in found.measured.experiments))
 
 
-DIAGNOSIS = JobKind(FOLDER, lambda root: root.mu_unit.uuid, folder_of, "diagnosis", heavy=True)
+DIAGNOSIS = JobKind(
+    FOLDER, lambda root: root.mu_unit.uuid, folder_of, "diagnosis", heavy=True, prefix="evidence_"
+)
 timings.READERS[DIAGNOSIS.name] = _timed
 
 _data: FileCache[MeasuredFolder] = FileCache()
@@ -243,13 +244,13 @@ class Course:
 SERIES = {"base_model": "model", "extended_model": "extended"}
 
 
-def course(root: Any, name: str) -> Course | None:
-    """A unit_pressure experiment with the diagnosis's prediction of it, or None."""
+def course(root: Any, name: str) -> Course:
+    """A unit_pressure experiment with the diagnosis's prediction of it; raises InputError without one."""
     found, judged = measured_data(root), diagnosis(root)
     every = found.measured.of("unit_pressure") if found and found.measured else ()
     e = next((e for e in every if e.name == name), None)
     if e is None:
-        return None
+        raise InputError(f"No unit under pressure was measured as {name!r}")
     channels = [c for c in e.columns if c == "angle_deg" or c.startswith("marker")]
     series = {"measured": {c: np.array(e[c]) for c in channels}}
     if judged is not None and judged.name and not judged.stale:
@@ -292,6 +293,3 @@ def write_protocol(course: Course, path: Path) -> Path:
     pressure[0] = 0.0  # gauge noise
     write_csv(path, ("time_s", "pressure_kPa"), zip(time.tolist(), pressure.tolist(), strict=True))
     return path
-
-
-register, unregister = property_group_factory(bpy.types.Object, "mu_evidence", (MU_PG_evidence,))
