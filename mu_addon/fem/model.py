@@ -163,6 +163,7 @@ class Model:
         # Elements of beams have neither.
         self._energy.zero_()
         self._smallest_J = wp.full(m, 1.0, dtype=wp.float64, device=device)
+        self._acting = put(np.flatnonzero(mesh.solid), int)
         means = m if self._takes_means else 0
         self._mean_J = wp.empty(means, dtype=wp.float64, device=device)
         self._mean_slope = wp.empty((means, k), dtype=wp.vec3d, device=device)
@@ -226,9 +227,10 @@ class Model:
         self._block_parts = wp.zeros(parts, dtype=mat33, device=self.device)
         self._blocks = wp.empty(len(keys), dtype=mat33, device=self.device)
         self._block_keys = keys
-        self._folding = TiedBlocks(mesh, keys) if len(mesh.tied) else None
+        self._folding = TiedBlocks(mesh, keys, self.device) if len(mesh.tied) else None
         if self._folding is not None:
             keys = self._folding.keys
+            self._folded = wp.empty(len(keys), dtype=mat33, device=self.device)
         if len(mesh.beams):
             keys = self._with_beam_blocks(keys)
         block_rows, block_columns = keys % n, keys // n
@@ -284,9 +286,13 @@ class Model:
         of_beams = np.minimum(first, second) * n + np.maximum(first, second)
         f = self._carried_blocks
         of_carried = f.column.astype(np.int64) * n + f.row
-        of_turns = np.unique(mesh.carriers[:, 1::2]).astype(np.int64) * (n + 1)
-        keys = np.unique(np.concatenate([own, of_beams, of_carried, of_turns]))
-        self._beam_places = tuple(np.searchsorted(keys, k) for k in (own, of_beams, of_carried))
+        of_turns = self._carried.turns.astype(np.int64) * (n + 1)
+        added, target = np.unique(np.concatenate([of_beams, of_carried, of_turns]), return_inverse=True)
+        keys = np.union1d(own, added)
+        self._own_places = np.searchsorted(keys, own)
+        # Where those of beams, of carried nodes and of turning sections are added, and which to each.
+        sums = sparse.csr_matrix((np.ones(len(target)), (target, np.arange(len(target)))))
+        self._of_beams = np.searchsorted(keys, added), sums
         self._all_keys = keys
         self._three = (3 * ends[:, :, None].astype(np.int64) + np.arange(3)).reshape(-1, 12)
         return keys
@@ -324,24 +330,19 @@ class Model:
         assert m.beams is not None
         assert self._carried is not None
         found = np.zeros((len(self._all_keys), 3, 3))
-        of_own, of_beams, of_carried = self._beam_places
-        found[of_own] = own
+        found[self._own_places] = own
         stiffness = m.beams.stiffness(self.unknowns_of_beams(u)).reshape(-1, 4, 3, 4, 3)
         a, b = np.tril_indices(4)
         blocks = stiffness[:, a, :, b].transpose(1, 0, 2, 3).reshape(-1, 3, 3)
         blocks = np.where(self._beam_turned[:, None, None], blocks.transpose(0, 2, 1), blocks)
-        np.add.at(found, of_beams, blocks)
         folded = self._carried_blocks(own[self._carrying], self._carried.operators(u))
-        np.add.at(found, of_carried, folded)
         seen = self._seen
         if seen is None or seen[1] != pressure or seen[2] is not m or not np.array_equal(seen[0], u):
             seen = u, pressure, m, self._forces(u, pressure, m)
-        turning, turns = self._carried.turning(u, seen[3], convex)
-        np.add.at(
-            found,
-            np.searchsorted(self._all_keys, turns.astype(np.int64) * (len(self.mesh.nodes) + 1)),
-            turning,
-        )
+        turning = self._carried.turning(u, seen[3], convex)
+        places, sums = self._of_beams
+        added = sums @ np.concatenate([blocks, folded, turning]).reshape(-1, 9)
+        found[places] += added.reshape(-1, 3, 3)
         return found
 
     @cached_property
@@ -483,8 +484,8 @@ class Model:
         """Run one kind of element kernel over every layer; the first to cover an element sets its output."""
         body = [self._u, self._tets, self._gradients, self._dV]
         if self._takes_means:
-            inputs = [*body, self._mean_J, self._mean_slope]
-            self._launch(kernels.mean_dilatation, len(self.mesh.tets), inputs)
+            inputs = [self._acting, *body, self._mean_J, self._mean_slope]
+            self._launch(kernels.mean_dilatation, len(self._acting), inputs)
         for layer in m.layers:
             inputs = [layer.elements, layer.rows, layer.mean_kappa, layer.history, layer.weight, layer.adds]
             inputs += [m.dt_s, *body, self._mean_J, *outputs]
@@ -748,7 +749,9 @@ class Model:
             if not own.all():
                 on_beams.append((pairs[~own], added[~own]))
         if self._folding is not None:
-            blocks = self._folding(blocks)
+            inputs = [self._put(blocks, mat33), *self._folding.lists, self._folded]
+            self._launch(kernels.spread_blocks, len(self._folded), inputs)
+            blocks = self._folded.numpy()
         return blocks, on_beams
 
     def matrix(self, values: Array) -> sparse.csc_matrix:

@@ -113,9 +113,8 @@ def test_sections_pressed_from_both_sides_stay_definite_where_asked(mesh):
     carried = Carried(mesh)
     slope = np.zeros_like(mesh.nodes)
     slope[mesh.carried] = mesh.nodes[mesh.carried] - mesh.nodes[mesh.carriers[:, 0]]
-    exact, turns = carried.turning(u, slope)
-    convex, same = carried.turning(u, slope, convex=True)
-    assert (same == turns).all()
+    exact = carried.turning(u, slope)
+    convex = carried.turning(u, slope, convex=True)
     before, after = np.linalg.eigvalsh(exact), np.linalg.eigvalsh(convex)
     assert (before.min(axis=1) < 0).any()
     np.testing.assert_allclose(after, np.maximum(before, 0.0), atol=1e-12 * np.abs(before).max())
