@@ -159,6 +159,8 @@ class Model:
             put(shape, wp.float64),
             put(weight, wp.float64),
         )
+        # Of the pressure, on each face.
+        self._shares = put(np.ones(f), wp.float64)
         self._energy = wp.empty(m, dtype=wp.float64, device=device)
         # Elements of beams have neither.
         self._energy.zero_()
@@ -173,7 +175,10 @@ class Model:
 
         self._parts = wp.zeros(m * k + f * kf, dtype=wp.vec3d, device=device)
         self._element_force = self._parts[: m * k].reshape((m, k))
-        self._face_force = self._parts[m * k :].reshape((f, kf)) if f else None
+        faces = (
+            self._parts[m * k :].reshape((f, kf)) if f else wp.empty((0, kf), dtype=wp.vec3d, device=device)
+        )
+        self._face_force = faces
         start, index = _lists(np.concatenate([mesh.tets.ravel(), mesh.cavity.ravel()]), n)
         self._node_lists = put(start, int), put(index, int)
         self._residual = wp.empty(n, dtype=wp.vec3d, device=device)
@@ -552,25 +557,20 @@ class Model:
             work -= float(m.beams.energy_mJ(self.unknowns_of_beams(u)).sum())
         return float(self._energy.numpy().sum() - work)
 
-    def _pressures(self, pressure: float) -> list[tuple[float, int, wp.array]]:
-        """Runs of the cavity's faces under one pressure: pressure in MPa, first face, faces (f, 3 | 6)."""
-        return [(pressure, 0, self._faces)] if len(self.mesh.cavity) else []
-
     def _pressure_work(self, pressure: float) -> float:
-        """Pressure in MPa times the volume that it fills, in mJ, at the displacement in `_place`."""
-        return pressure * self._volume()
+        """Work in mJ of a pressure in MPa on the cavity's faces, at the displacement in `_place`."""
+        return pressure * float(self._shares.numpy() @ self._face_volumes())
 
-    def _volume(self) -> float:
-        if len(self.mesh.cavity) == 0:
-            return 0.0
+    def _face_volumes(self) -> Array:
+        """Volume (f,) in mm3 between each of the cavity's faces and the origin, at that displacement."""
         inputs = [self._x, self._faces, *self._face_rule, self._face_volume]
         wp.launch(follower_pressure.enclosed_volume, len(self.mesh.cavity), inputs, device=self.device)
-        return float(self._face_volume.numpy().sum())
+        return np.asarray(self._face_volume.numpy())
 
     def cavity_volume(self, u: Array) -> float:
         """Volume in mm3 that the cavity surface displaced by u (n, 3) in mm and the mirror planes enclose."""
         self._place(u)
-        return self._volume()
+        return float(self._face_volumes().sum())
 
     def smallest_jacobian(self, u: Array, m: MaterialData) -> tuple[float, int]:
         """The smallest det F at any quadrature point at u (n, 3) in mm, and the number of its element."""
@@ -598,9 +598,8 @@ class Model:
         self._place(u)
         self._least_force = m.least_force_N
         self._launch_layers("force", m, [self._mean_slope, self._element_force])
-        for part_MPa, first, faces in self._pressures(pressure):
-            inputs = [part_MPa, self._x, faces, *self._face_rule, first, self._face_force]
-            wp.launch(follower_pressure.pressure_force, len(faces), inputs, device=self.device)
+        inputs = [pressure, self._shares, self._x, self._faces, *self._face_rule, self._face_force]
+        wp.launch(follower_pressure.pressure_force, len(self.mesh.cavity), inputs, device=self.device)
         inputs = [self._parts, *self._node_lists, self._residual]
         wp.launch(kernels.gather_vectors, len(self.mesh.nodes), inputs, device=self.device)
         residual: Array = self._residual.numpy().copy()
@@ -630,11 +629,9 @@ class Model:
         """
         self._place(u)
         self._launch_layers("stiffness", m, [self._mean_slope, self._block_parts])
-        per_face = self.mesh.cavity.shape[1] * (self.mesh.cavity.shape[1] + 1) // 2
-        for part_MPa, first, faces in self._pressures(pressure):
-            inputs = [part_MPa, self._x, faces, *self._face_rule]
-            inputs += [self._element_blocks + first * per_face, self._block_parts]
-            wp.launch(follower_pressure.pressure_stiffness, len(faces), inputs, device=self.device)
+        inputs = [pressure, self._shares, self._x, self._faces, *self._face_rule]
+        inputs += [self._element_blocks, self._block_parts]
+        wp.launch(follower_pressure.pressure_stiffness, len(self.mesh.cavity), inputs, device=self.device)
         values = self._values(u, pressure, m, convex)
         if self.self_contact is None and self.pattern is self._own_pattern:
             return values
