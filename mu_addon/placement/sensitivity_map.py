@@ -10,8 +10,8 @@ import numpy as np
 
 from ..errors import MeshingError
 from ..fem.elementwise import element_forces
+from ..fem.embedding import Probe
 from ..fem.factor import IndefiniteError
-from ..fem.kinematics import Probe
 from ..fem.materials import Materials
 from ..fem.model import MaterialData, Model
 from ..fem.state import State
