@@ -55,7 +55,8 @@ class Carried:
             (levers.ravel(), (3 * self._of[:, None] + three).ravel(), np.arange(0, 3 * len(own) + 1, 3)),
             shape=(len(own), 3 * len(self.turns)),
         )
-        of_node = sparse.csr_matrix((np.ones(len(own)), (own, np.arange(len(own)))))
+        pairs = len(self.nodes), len(own)
+        of_node = sparse.csr_matrix((np.ones(len(own)), (own, np.arange(len(own)))), shape=pairs)
         self._turned = sparse.csr_matrix(of_node @ self._levers)
         self._means = sparse.csr_matrix((self._share, (own, self._node)), shape=(len(self.nodes), self.count))
         # Operators that do not depend on the displacement, and the last rotation vectors with all of theirs.

@@ -612,6 +612,11 @@ class Model:
             residual -= self.load
         return residual
 
+    def element_forces(self, u: Array, m: MaterialData) -> Array:
+        """Internal forces (m, k, 3) in N of every element on its nodes, at displacements (n, 3) in mm."""
+        self._forces(u, 0.0, m)
+        return np.asarray(self._element_force.numpy().copy())
+
     def force_scale(self) -> float:
         """Root sum of squares of all element and face forces of the last residual, in N.
 
