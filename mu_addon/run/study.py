@@ -170,9 +170,9 @@ class Found:
         return found
 
 
-def setting(description: Any, *, metavar: str | None = None, decides: bool = True) -> Any:
+def setting(description: Any, *, metavar: str | None = None, decides: bool = True, option: str = "") -> Any:
     """attrs field of an input that is a plain value, of the description's name, default and bounds."""
-    given = Input("setting", (description,), decides, metavar=metavar)
+    given = Input("setting", (description,), decides, option=option, metavar=metavar)
     return attrs.field(
         default=description.default, converter=description.checked, metadata={_INPUT: given}, kw_only=True
     )
