@@ -253,8 +253,8 @@ def test_a_gauge_s_noise_is_averaged_out_and_remarked_on(tmp_path, gauge_kPa):
     ("spoil", "what", "where"),
     [
         (lambda f: (f / "block_1.csv").write_text("strain,stress_kPa\n0,0\n0.1,x\n"), "x", "row 3"),
-        (lambda f: (f / "block_1.csv").unlink(), "cannot read block_1.csv", "experiments.toml"),
-        (lambda f: (f / "experiments.toml").unlink(), "cannot read experiments.toml", ""),
+        (lambda f: (f / "block_1.csv").unlink(), "cannot read the data", "experiments.toml"),
+        (lambda f: (f / "experiments.toml").unlink(), "cannot read the experiments", ""),
         (
             lambda f: (f / "experiments.toml").write_text(
                 (f / "experiments.toml").read_text().replace('"fit"', '"held_out"')
