@@ -37,7 +37,7 @@ from ..usecases.simulate_and_place.settings import (
 )
 from .inputs import OnceInput
 from .unit_inputs import OpticsInput
-from .unit_motion import SOLVER, UnitMotion, taking, state_message
+from .unit_motion import SOLVER, UnitMotion, state_message, taking
 
 LATTICE = "paths, and limits of --paths graph"
 COARSER = 0.7

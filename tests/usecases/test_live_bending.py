@@ -56,6 +56,7 @@ def test_a_wall_from_the_design_before_bends_as_one_meshed_anew(tmp_path):
     assert not warm.step(), "nothing more was asked for"
 
 
+@pytest.mark.nightly("test_a_wall_from_the_design_before_bends_as_one_meshed_anew")
 def test_a_lattice_of_another_kind_bends_too(tmp_path):
     """Its cell is meshed once: a thicker wall moves the mesh."""
     bending, unit = LiveBending(tmp_path), UNIT.evolve(**custom(cross()), seats=False)

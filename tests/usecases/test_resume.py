@@ -160,13 +160,10 @@ def test_an_older_diagnosis_says_how_to_go_on(tmp_path):
 @pytest.mark.parametrize(
     ("line", "what"),
     [
-        ("cells = 2.5", "cells = 2.5 is not a whole number"),
         ("cells = 99", "cells = 99 is out of bounds"),
-        ("friction = 3", "friction = 3 is not a text"),
         ("colour = 1", "unknown key 'colour'"),
         ("run = 1", "run is not a table"),
         ("format = 2", "format = 2"),
-        ("cells = [", "this is not TOML"),
     ],
 )
 def test_inputs_that_were_changed_by_hand_are_named(tmp_path, line, what):
