@@ -22,6 +22,7 @@ from mu_addon.usecases.simulate_and_place.candidates import (
     solving,
 )
 from mu_addon.usecases.simulate_and_place.mechanics import Samples
+from mu_addon.usecases.simulate_and_place.place_stages import Uncertainty, letting_in
 from mu_addon.usecases.simulate_and_place.ranking import Ranking, mesh_change_mm
 
 from . import made_up
@@ -61,7 +62,9 @@ def ranked(contest=None, count=3, pressures=PRESSURES, before=None):
     )
     every = evaluated(compared, found, check, motion, ANCHORS, STATIONS)
     deviations = {name: one.deviation for name, one in every.items()}
-    return SimpleNamespace(standing=found, check=check, deviations=deviations, asked=asked, along=along)
+    return SimpleNamespace(
+        compared=compared, standing=found, check=check, deviations=deviations, asked=asked, along=along
+    )
 
 
 def solutions(found):
@@ -233,6 +236,8 @@ def test_where_states_depend_on_the_path_nothing_is_left_out(monkeypatch):
     found = contested(Contest(3))
     assert not found.check.independent
     assert (len(found.deviations), found.standing.at_least_mm) == (10, {})
+    more = letting_in(found.compared, Contest(3), found.standing, found.check, Uncertainty(1.0))
+    assert answered(more, pytest.fail) == (found.standing, [])
 
 
 def test_with_history_instants_count_until_the_first_that_a_path_does_not_reach():
