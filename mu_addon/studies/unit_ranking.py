@@ -544,6 +544,11 @@ class UnitStudy(UnitMotion):
 
     # What is shown of the paths.
 
+    @intermediate()
+    def painter(self, meshed: meshing.Mesh, mechanics: core.Mechanics, states: Members) -> core.PathMotions:
+        """What gives fields of a mesh's states, for display."""
+        return core.PathMotions(mechanics, meshed, meshed, states)
+
     @stage(
         "motion of the paths",
         taking("motion of the paths"),
@@ -564,11 +569,6 @@ class UnitStudy(UnitMotion):
         if not path_check.independent or path in last_standing.at_least_mm:
             raise Dropped
         return painter.of(core.differences(path, {**candidates, **(let_in or {})}, last_standing))
-
-    @intermediate()
-    def painter(self, meshed: meshing.Mesh, mechanics: core.Mechanics, states: Members) -> core.PathMotions:
-        """What gives fields of a mesh's states, for display."""
-        return core.PathMotions(mechanics, meshed, meshed, states)
 
     @stage(
         "map",
