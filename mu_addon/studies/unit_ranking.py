@@ -481,10 +481,8 @@ class UnitStudy(UnitMotion):
             ("path", "pressures_kPa"),
             lambda study: [],
             _way,
-            grows=lambda study, standing, uncertainty: core.solving(
-                study.compared, core.widened(study.contest, uncertainty), standing
-            ),
-            after=("standing", "uncertainty"),
+            grows=lambda study, *found: core.letting_in(study.compared, study.contest, *found),
+            after=("standing", "path_check", "uncertainty"),
         ),
         wanted=_checks_by_pressure,
         parallel=True,
@@ -514,10 +512,10 @@ class UnitStudy(UnitMotion):
         let_in: Members | None = None,
     ) -> core.Standing:
         """Where the candidates stand in the end."""
-        if not path_check.independent or let_in is None:
+        if let_in is None:
             return standing
         found: core.Standing = grown(
-            core.solving(compared, core.widened(contest, uncertainty), standing), let_in
+            core.letting_in(compared, contest, standing, path_check, uncertainty), let_in
         )
         return found
 
@@ -546,6 +544,11 @@ class UnitStudy(UnitMotion):
 
     # What is shown of the paths.
 
+    @intermediate()
+    def painter(self, meshed: meshing.Mesh, mechanics: core.Mechanics, states: Members) -> core.PathMotions:
+        """What gives fields of a mesh's states, for display."""
+        return core.PathMotions(mechanics, meshed, meshed, states)
+
     @stage(
         "motion of the paths",
         taking("motion of the paths"),
@@ -566,11 +569,6 @@ class UnitStudy(UnitMotion):
         if not path_check.independent or path in last_standing.at_least_mm:
             raise Dropped
         return painter.of(core.differences(path, {**candidates, **(let_in or {})}, last_standing))
-
-    @intermediate()
-    def painter(self, meshed: meshing.Mesh, mechanics: core.Mechanics, states: Members) -> core.PathMotions:
-        """What gives fields of a mesh's states, for display."""
-        return core.PathMotions(mechanics, meshed, meshed, states)
 
     @stage(
         "map",
