@@ -79,7 +79,8 @@ def _plan_of(call: Call) -> Plan:
         )
     variables = tuple(variable(name, TomlTable(table, call.node)) for name, table in ranges)
     # A setting that is wrong for every point is reported before any work.
-    UnitStudy.of_tables(tables, Path(call.node), unit=design.unit, protocol=protocol, workers=1)
+    named = {name: TomlTable(table, call.node, name=name) for name, table in tables.items()}
+    UnitStudy.of_tables(named, Path(call.node), unit=design.unit, protocol=protocol, workers=1)
     return Plan(
         inputs=Inputs(design.unit, protocol, tables),
         variables=variables,
