@@ -594,25 +594,26 @@ class Study:
         own = tables if cls.commands else tables[""]
         return toml_text({"format": cls.version, **own, **({RUN: run} if run else {})}, cls.layout().header)
 
-    def texts_in(self, folder: Path, asked: bool = False) -> tuple[dict[str, str], tuple[str, ...]]:
-        """Texts for a folder, with inputs of further targets there that are still valid, and those targets.
+    def texts_in(self, folder: Path, asked: bool = False) -> tuple[dict[str, str], tuple[str, ...], bool]:
+        """Texts for a folder with the inputs of further targets there, those targets, and if it stays valid.
 
-        Without further targets, as `texts`. asked: the table [run] names the targets of this study. Raises
-        InputError for a file of inputs that cannot be used.
+        It stays valid if all targets that both have are of the same inputs; else the texts are these alone.
+        asked: the table [run] names the targets of this study. Raises InputError for a file of inputs that
+        cannot be used.
         """
         tables, run, files = self._written()
         path = folder / self.layout().inputs
         if not self.commands or not path.is_file():
-            return self.texts(), ()
+            return self.texts(), (), False
         old, _, _ = self.read_tables(path)
         further = tuple(target for target in self.commands if target in old and target not in tables)
         same = all(old[target].values == tables[target] for target in tables if target in old)
-        more = self._named_files(path, {target: old[target] for target in further}) if same else None
-        if not further or more is None:
-            return self.texts(), ()
+        more = self._named_files(path, old) if same else None
+        if more is None:
+            return self.texts(), (), False
         merged = tables | {target: dict(old[target].values) for target in further}
-        run |= {TARGETS: list(tables)} if asked else {}
-        return {self.layout().inputs: self._text(merged, run), **files, **more}, further
+        run |= {TARGETS: list(tables)} if asked and further else {}
+        return {self.layout().inputs: self._text(merged, run), **more, **files}, further, True
 
     @classmethod
     def read_tables(

@@ -41,8 +41,8 @@ def begin_study(job: Study, folder: Path, context: RunContext) -> None:
     """
     context.lock_folder(folder)
     job = job.complete()
-    texts, further = job.texts_in(folder)
-    if further:
+    texts, _, valid = job.texts_in(folder)
+    if valid:
         # Further targets of the same inputs make the file of inputs longer, and nothing stale.
         keep_inputs(folder, texts, job.layout().inputs)
         context.summary = _earlier(folder) | context.summary
@@ -59,8 +59,8 @@ def write_study(job: Study, folder: Path) -> None:
     lock = FolderLock(folder)
     try:
         job = job.complete()
-        texts, further = job.texts_in(folder, asked=True)
-        if further:
+        texts, _, valid = job.texts_in(folder, asked=True)
+        if valid:
             keep_inputs(folder, texts, job.layout().inputs)
         claim(folder, job.layout(), texts)
     finally:

@@ -43,8 +43,8 @@ def test_a_study_comes_back_from_its_folder(tmp_path, stages):
 def test_a_smaller_study_keeps_the_inputs_of_further_targets(tmp_path):
     keep_inputs(tmp_path, JOB.texts())
     small = attrs.evolve(JOB, stages=STAGES[:1], times=13, protocol=Protocol(np.arange(2.0), np.arange(2.0)))
-    texts, further = small.texts_in(tmp_path)
-    assert further == STAGES[1:]
+    texts, further, valid = small.texts_in(tmp_path)
+    assert (further, valid) == (STAGES[1:], True)
     (tmp_path / "more").mkdir()
     keep_inputs(tmp_path / "more", texts)
     assert UnitStudy.read(tmp_path / "more").tables == JOB.tables
@@ -52,7 +52,7 @@ def test_a_smaller_study_keeps_the_inputs_of_further_targets(tmp_path):
 
 def test_a_larger_study_adds_its_tables(tmp_path):
     keep_inputs(tmp_path, attrs.evolve(JOB, stages=STAGES[:1]).texts())
-    assert JOB.texts_in(tmp_path) == (JOB.texts(), ())
+    assert JOB.texts_in(tmp_path) == (JOB.texts(), (), True)
 
 
 @pytest.mark.parametrize(
@@ -71,7 +71,7 @@ def test_a_larger_study_adds_its_tables(tmp_path):
 def test_what_changed_is_not_current(tmp_path, change):
     keep_inputs(tmp_path, JOB.texts())
     job = change(tmp_path)
-    assert job.texts_in(tmp_path) == (job.texts(), ())
+    assert job.texts_in(tmp_path) == (job.texts(), (), False)
 
 
 def test_a_study_of_fewer_targets_is_written_with_the_others_and_runs_its_own(tmp_path):
