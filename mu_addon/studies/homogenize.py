@@ -223,15 +223,9 @@ class Homogenize(Study):
         cell: design.StrutCell,
         resin: Resin,
         documents: str,
-    ) -> homogenize.Effective:
-        """The lattice's moduli and law with their origin."""
-        from ..homogenize.effective_file import effective
-
-        e = elasticity
-        described_cell = cell_table(cell)
-        return effective(
-            fit, (e.C11, e.C12, e.C44), e.relative_density, described_cell, attrs.asdict(resin), documents
-        )
+    ) -> str:
+        """The lattice's moduli and law with their origin, as effective.toml has them."""
+        return homogenize.effective_text(fit, elasticity, cell_table(cell), attrs.asdict(resin), documents)
 
     # The block between plates.
 
@@ -517,7 +511,7 @@ class Homogenize(Study):
         self,
         stretched: homogenize.Stretched,
         fit: homogenize.FoamFit | None = None,
-        effective: homogenize.Effective | None = None,
+        effective: str | None = None,
     ) -> Iterator[Part]:
         """The law beside the cell that it is fitted to."""
         curve = stretched.curve
@@ -534,7 +528,7 @@ class Homogenize(Study):
         if fit is None:
             return
         if effective is not None:
-            yield File("effective.toml", lambda path: effective.text())
+            yield File("effective.toml", lambda path: effective)
         yield recorded("law.misfit", attrs.asdict(fit.misfit))
         small = {"E_kPa": 1e3 * fit.E_MPa, "poisson": fit.poisson, "C44_kPa": 1e3 * fit.C44_MPa}
         yield recorded("law.small_strain", small)
