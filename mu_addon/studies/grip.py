@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from pathlib import Path
 from typing import Any
 
@@ -14,7 +14,7 @@ from ..design.settings import FRICTION, QUALITY
 from ..errors import InputError, OutputError
 from ..grasp.settings import BEYOND, DENSITY, STEP_S
 from ..meshing.settings import REFINE, SELF_CONTACT
-from ..run.parts import Beside, Chart, Fact, File, Part, Pictures, Sentence, Table, Warn, csv, recorded
+from ..run.parts import Beside, Chart, Fact, File, Part, Pictures, Sentence, Table, Warn, csv, recorded, said
 from ..run.study import (
     Found,
     Input,
@@ -22,7 +22,6 @@ from ..run.study import (
     Over,
     Study,
     Tell,
-    Written,
     derived,
     given,
     intermediate,
@@ -30,7 +29,7 @@ from ..run.study import (
     setting,
     stage,
 )
-from .inputs import UNIT, NumbersInput
+from .inputs import UNIT, FileInput, NumbersInput
 
 CUBES = described("cubes_mm", "12.5 25", "side lengths in mm of the cubes to grasp")
 COARSE = described("coarse", False, "quick, less accurate run: coarser mesh, longer time steps")
@@ -52,55 +51,38 @@ COLUMNS = (
 )  # fmt: skip
 
 
+def _files_of(gripper: design.Gripper) -> dict[str, str]:
+    from ..design.gripper import to_toml
+
+    return {"gripper.toml": to_toml(gripper, UNIT), UNIT: design.to_toml(gripper.unit)}
+
+
 @attrs.frozen
-class GripperInput(Input):
-    """A gripper, in a file of its own; its unit in another one."""
+class GripperInput(FileInput):
+    """A gripper; its unit is in another file."""
 
     kind: str = "gripper"
-
-    def write(self, name: str, value: design.Gripper) -> Written:
-        """Both files, and the name of the first."""
-        from ..design.gripper import to_toml
-
-        file = f"{name}.toml"
-        return Written({name: file}, files={file: to_toml(value, UNIT), UNIT: design.to_toml(value.unit)})
-
-    def read(self, name: str, found: Found) -> design.Gripper:
-        """The gripper of the folder; raises InputError."""
-        found.keys.pop(name, None)
-        return design.read_gripper(found.path.parent / f"{name}.toml")
-
-    def file_names(self, name: str) -> tuple[str, ...]:
-        """Both files."""
-        return f"{name}.toml", UNIT
+    files: tuple[str, ...] = ("gripper.toml", UNIT)
+    texts: Callable[[Any], Mapping[str, str]] = _files_of
+    of: Callable[[Path], Any] = lambda path: design.read_gripper(path)
 
 
 @attrs.frozen
-class PhasesInput(Input):
-    """Pressure over the phases of a grasp, in a file of its own."""
+class PhasesInput(FileInput):
+    """Pressure over the phases of a grasp."""
 
     kind: str = "phases"
+    files: tuple[str, ...] = ("protocol.csv",)
+    texts: Callable[[Any], Mapping[str, str]] = lambda phases: {"protocol.csv": phases.text()}
+    of: Callable[[Path], Any] = lambda path: grasp.read_phases(path)
 
     def made(self, values: tuple[Any, ...], given: Mapping[str, Any]) -> grasp.Phases:
         """The phases of a file, by default those that are shipped; raises InputError."""
         return grasp.read_phases(Path(values[0])) if values[0] else grasp.shipped_phases()
 
-    def write(self, name: str, value: grasp.Phases) -> Written:
-        """Its file."""
-        return Written({name: f"{name}.csv"}, files={f"{name}.csv": value.text()})
-
-    def read(self, name: str, found: Found) -> grasp.Phases:
-        """The phases of the folder; raises InputError."""
-        found.keys.pop(name, None)
-        return grasp.read_phases(found.path.parent / f"{name}.csv")
-
     def same(self, value: grasp.Phases, other: grasp.Phases) -> bool:
         """Return True for equal pressures and phases."""
         return value.text() == other.text()
-
-    def file_names(self, name: str) -> tuple[str, ...]:
-        """Its file."""
-        return (f"{name}.csv",)
 
 
 @attrs.frozen
@@ -348,7 +330,7 @@ class Grip(Study):
         if grasps:
             yield recorded("grasps", {f"{s:g}": figures_of(g) for s, g in grasps.items()})
         size = f"{x:g} x {y:g} x {z:.4g} mm"
-        yield Sentence(f"one part of {size}, {part.gates.inner_shells} chambers", terminal=True, page=False)
+        yield from said(f"one part of {size}, {part.gates.inner_shells} chambers")
         yield File("gripper.stl", lambda path: design.stl_bytes(part.vertices, part.triangles))
         yield File("gripper.3mf", lambda path: _threemf(gripper.name, part))
         shown = [Fact("part", size, size), Fact("resin", 0, f"{part.gates.volume_mm3 / 1e3:.3g} ml")]
@@ -357,10 +339,8 @@ class Grip(Study):
             angle, force, lift = g.angle_deg[g.end("iii")], g.normal_N[g.end("iii")], g.lift
             shown.append(Fact(f"{side:g} mm, plateau", angle, f"{angle:.1f}°, {force:.2f} N"))
             hung = f"held, {lift.margin:.3g} times its weight" if lift.held else "not lifted"
-            yield Sentence(
-                f"cube of {side:g} mm: {angle:.1f} deg and {force:.3g} N a finger at the plateau, {hung}",
-                terminal=True,
-                page=False,
+            yield from said(
+                f"cube of {side:g} mm: {angle:.1f} deg and {force:.3g} N a finger at the plateau, {hung}"
             )
             words.append(
                 f"The cube of {side:g} mm is lifted: friction can carry {lift.margin:.1f} times its weight."

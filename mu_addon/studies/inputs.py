@@ -18,7 +18,7 @@ from ..reading import file_text, unreadable
 from ..run.inputs import named_path, structured
 from ..run.study import Found, Input, Written, given
 
-UNIT, MODEL = "unit.toml", "model.toml"
+UNIT, MODEL, RESIN = "unit.toml", "model.toml", "resin.toml"
 # Characters of a path's points: some ten thousand of them.
 _LONGEST_PATH = 1 << 18
 
@@ -31,28 +31,45 @@ def asked(
 
 
 @attrs.frozen
-class UnitInput(Input):
-    """A unit, in a file of its own; needed: there is always one; default: the preset where none is given."""
+class FileInput(Input):
+    """A value in a file of its own, which its key names, or in several.
 
-    kind: str = "unit"
+    needed: there is always one; usual: the key without one. files: their names, that of the key first; texts:
+    of a value, by name; of: the value of the first file, raises InputError.
+    """
+
     needed: bool = True
-    default: str = ""
+    usual: str | None = None
+    files: tuple[str, ...] = ()
+    texts: Callable[[Any], Mapping[str, str]] = lambda value: {}
+    of: Callable[[Path], Any] = lambda path: None
 
-    def write(self, name: str, value: design.Unit | None) -> Written:
-        """The file's name, and its text."""
+    def write(self, name: str, value: Any) -> Written:
+        """The first file's name, and the text of each."""
         if value is None:
-            return Written()
-        return Written({name: UNIT}, files={UNIT: design.to_toml(value)})
+            return Written({name: self.usual})
+        return Written({name: self.files[0]}, files=self.texts(value))
 
-    def read(self, name: str, found: Found) -> design.Unit | None:
-        """The unit of the folder; raises InputError."""
-        if found.keys.pop(name, None) is None and not self.needed:
+    def read(self, name: str, found: Found) -> Any:
+        """The value of the folder's file; raises InputError."""
+        if found.keys.pop(name, self.usual) == self.usual and not self.needed:
             return None
-        return design.read_unit(found.path.parent / UNIT)
+        return self.of(found.path.parent / self.files[0])
 
     def file_names(self, name: str) -> tuple[str, ...]:
-        """Its file."""
-        return (UNIT,)
+        """All files."""
+        return self.files
+
+
+@attrs.frozen
+class UnitInput(FileInput):
+    """A unit; default: the preset where none is given."""
+
+    kind: str = "unit"
+    default: str = ""
+    files: tuple[str, ...] = (UNIT,)
+    texts: Callable[[Any], Mapping[str, str]] = lambda unit: {UNIT: design.to_toml(unit)}
+    of: Callable[[Path], Any] = lambda path: design.read_unit(path)
 
     def same(self, value: design.Unit | None, other: design.Unit | None) -> bool:
         """Return True if they differ in name alone."""
@@ -182,13 +199,18 @@ class ResinInput(Input):
 
 
 @attrs.frozen
-class MaterialInput(Input):
+class MaterialInput(FileInput):
     """A resin with all its figures, by a name of the library or a file; None stands for the usual one.
 
     So a window that writes inputs loads no library.
     """
 
     kind: str = "material"
+    needed: bool = False
+    usual: str | None = USUAL_RESIN
+    files: tuple[str, ...] = (RESIN,)
+    texts: Callable[[Any], Mapping[str, str]] = lambda resin: {RESIN: materials.material_text(resin)}
+    of: Callable[[Path], Any] = lambda path: materials.read_material(path)
 
     def made(self, values: tuple[Any, ...], given: Mapping[str, Any]) -> materials.Material | None:
         """The resin of a name or of a file; raises InputError."""
@@ -198,22 +220,6 @@ class MaterialInput(Input):
         return (
             materials.read_material(Path(name)) if name.endswith(".toml") else materials.load_material(name)
         )
-
-    def write(self, name: str, value: materials.Material | None) -> Written:
-        """Its name, and its file unless it is the usual one."""
-        if value is None:
-            return Written({name: USUAL_RESIN})
-        return Written({name: f"{name}.toml"}, files={f"{name}.toml": materials.material_text(value)})
-
-    def read(self, name: str, found: Found) -> materials.Material | None:
-        """The resin that the file names; raises InputError."""
-        if found.keys.pop(name, USUAL_RESIN) == USUAL_RESIN:
-            return None
-        return materials.read_material(found.path.parent / f"{name}.toml")
-
-    def file_names(self, name: str) -> tuple[str, ...]:
-        """Its file."""
-        return (f"{name}.toml",)
 
 
 @attrs.frozen
@@ -307,10 +313,13 @@ def _points(text: str) -> tuple[tuple[float, float, float], ...]:
 
 
 @attrs.frozen
-class PrinterInput(Input):
+class PrinterInput(FileInput):
     """A printer with its resin, and limits measured on it in place of the printer's; its values are kept."""
 
     kind: str = "printer"
+    files: tuple[str, ...] = ("printer.toml",)
+    texts: Callable[[Any], Mapping[str, str]] = lambda printer: {"printer.toml": design.printer_text(printer)}
+    of: Callable[[Path], Any] = lambda path: design.read_printer(path)
 
     def made(self, values: tuple[Any, ...], given: Mapping[str, Any]) -> design.Printer:
         """The printer of a name or a file, with the limits of a filled sheet; raises InputError."""
@@ -318,14 +327,6 @@ class PrinterInput(Input):
 
         printer, limits = design.load_printer(values[0]), given.get("limits")
         return printer.with_limits(measured_limits(Path(limits))) if limits else printer
-
-    def write(self, name: str, value: design.Printer) -> Written:
-        """Its file."""
-        return Written({name: f"{name}.toml"}, files={f"{name}.toml": design.printer_text(value)})
-
-    def read(self, name: str, found: Found) -> design.Printer:
-        """The printer of the folder; raises InputError."""
-        return design.read_printer(found.path.parent / str(found.keys.pop(name, "")))
 
 
 @attrs.frozen
@@ -389,23 +390,14 @@ class NumbersInput(Input):
 
 
 @attrs.frozen
-class ModelInput(Input):
-    """An extended model of a diagnosis, in a file of its own, or None."""
+class ModelInput(FileInput):
+    """An extended model of a diagnosis, or None."""
 
     kind: str = "model"
-
-    def write(self, name: str, value: evidence.ExtendedModel | None) -> Written:
-        """The file's name, and its text."""
-        return Written() if value is None else Written({name: MODEL}, files={MODEL: value.text()})
-
-    def read(self, name: str, found: Found) -> evidence.ExtendedModel | None:
-        """The model of the folder, if it has one; raises InputError."""
-        named = found.keys.pop(name, None)
-        return None if named is None else evidence.load_model(found.path.parent / MODEL)
-
-    def file_names(self, name: str) -> tuple[str, ...]:
-        """Its file."""
-        return (MODEL,)
+    needed: bool = False
+    files: tuple[str, ...] = (MODEL,)
+    texts: Callable[[Any], Mapping[str, str]] = lambda model: {MODEL: model.text()}
+    of: Callable[[Path], Any] = lambda path: evidence.load_model(path)
 
 
 _SCHEDULER = described(
