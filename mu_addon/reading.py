@@ -80,6 +80,16 @@ def file_text(path: str | Path, most: int = _LONGEST) -> str:
     return file_bytes(path, most).decode("utf-8-sig").replace("\r\n", "\n").replace("\r", "\n")
 
 
+def text_of(path: str | Path, what: str, remedy: str, most: int = _LONGEST) -> str:
+    """The text of a file as of `file_text`; raises InputError. what: the file's, as "design"."""
+    try:
+        return file_text(path, most)
+    except OSError as error:
+        raise InputError(f"cannot read the {what}: {unreadable(error)}", str(path), remedy) from error
+    except UnicodeDecodeError as error:
+        raise InputError("the file is not UTF-8 text", str(path), "save it as UTF-8") from error
+
+
 def _size(count: int) -> str:
     return f"{count / 1e6:.0f} MB" if count >= 1e7 else f"{count / 1e3:.0f} kB"
 

@@ -2,9 +2,7 @@
 
 from __future__ import annotations
 
-import re
-from collections.abc import Iterator, Mapping
-from contextlib import contextmanager
+from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
@@ -14,15 +12,15 @@ from ..design.anchors import windows
 from ..design.body import Body, envelope, read_body
 from ..design.parameters import Unit, load_preset, read_unit, to_toml
 from ..design.printing.printer import DEFAULT, load_printer
-from ..design.quantity import Description
+from ..design.rows import Row, rows_of, top_of
 from ..design.settings import ORIENTATION, USUAL_RESIN
-from ..errors import InputError, did_you_mean
+from ..errors import InputError
 from ..materials.library import Material, load_material, material_text, read_material
 from ..meshing.settings import MeshSettings
-from ..reading import file_text, parse_toml
+from ..reading import parse_toml, text_of
 from ..toml_writer import toml_text
 from . import settings as settings_of
-from .freedoms import PATH, Freedom, changed_unit, fixed_values, read_freedoms
+from .freedoms import PATH, Freedom, changed_unit, not_fixed, read_freedoms, with_fixed
 from .freedoms import RESIN as RESIN_FREEDOM
 from .quantities import Stretch
 from .search import SearchSettings
@@ -190,14 +188,7 @@ def _elongation(material: Material) -> float:
 
 def read_design(path: Path, unit: Unit | None = None, body: Body | None = None) -> Design:
     """The design of a file, see `parse_design`; raises InputError with file, line and key."""
-    try:
-        text = file_text(path, _LONGEST)
-    except OSError as error:
-        raise InputError(
-            f"cannot read the design: {error.strerror or error}", str(path), "give the path of a design.toml"
-        ) from error
-    except UnicodeDecodeError as error:
-        raise InputError("the file is not UTF-8 text", str(path), "save it as UTF-8") from error
+    text = text_of(path, "design", "give the path of a design.toml", _LONGEST)
     return parse_design(text, str(path), unit, path.parent, body)
 
 
@@ -205,104 +196,59 @@ def parse_design(
     text: str,
     origin: str,
     unit: Unit | None = None,
-    folder: Path | None = None,
+    folder: Path = Path(),
     body: Body | None = None,
 ) -> Design:
     """The design in TOML text; raises InputError with file, line and key.
 
     unit, body: replace those that the text names; folder: of its files.
     """
-    with located_keys(text):
-        return _design(text, origin, unit, folder or Path(), body)
-
-
-@contextmanager
-def located_keys(text: str) -> Iterator[None]:
-    """Context that replaces the line of a table by that of its key, where an InputError names both."""
-    try:
-        yield
-    except InputError as error:
-        match = re.fullmatch(r"(.*, line )(\d+)(, (\w+))", error.where)
-        if match is None:
-            raise
-        line = int(match[2])
-        rest = text.splitlines()[line:]
-        for number, row in enumerate(rest, line + 1):
-            if re.match(r"\s*\[", row):
-                break
-            if re.match(rf"\s*{match[4]}\s*=", row):
-                raise InputError(error.what, f"{match[1]}{number}{match[3]}", error.remedy) from error
-        raise
-
-
-def _design(text: str, origin: str, unit: Unit | None, folder: Path, body: Body | None) -> Design:
     document = parse_toml(text, origin)
-    for key in document:
-        if key not in _KEYS:
-            raise InputError(
-                f"unknown key {key!r}{did_you_mean(key, _KEYS)}",
-                f"{origin}, {_line(text, key)}, {key}",
-                f"known: {', '.join(_KEYS)}",
-            )
+    top = top_of(document, text, origin)
+    top.require_keys(_KEYS)
     if document.get("format") != FORMAT or isinstance(document.get("format"), bool):
-        raise InputError(
-            f"format = {document.get('format', 'missing')}", f"{origin}, format", f"write format = {FORMAT}"
-        )
-    tables = {key: _tables(document, key, origin) for key in ("target", "freedom")}
-    where = {key: _places(text, key, origin, len(rows)) for key, rows in tables.items()}
-    number = _Numbers(document, text, origin)
-    base = unit or _unit(document, origin, folder)
-    fixed = fixed_values(tables["freedom"], where["freedom"])
-    base = changed_unit(base, [Freedom(name) for name in fixed], list(fixed.values()))
-    freedoms = read_freedoms(tables["freedom"], where["freedom"], base)
-    resin, printer = (
-        _word(document, "resin", USUAL_RESIN, origin),
-        _word(document, "printer", DEFAULT, origin),
-    )
+        what = f"format = {document.get('format', 'missing')}"
+        raise top.refusal(what, "format", f"write format = {FORMAT}")
+    asked, free = (rows_of(document, text, origin, key) for key in ("target", "freedom"))
+    base = with_fixed(unit or _unit(top, folder), free)
+    freedoms = read_freedoms(free, base)
+    resin, printer = top.word("resin", USUAL_RESIN), top.word("printer", DEFAULT)
     material = _material(resin, folder, f"{origin}, resin")
-    materials = {
-        name: material if name == resin else _material(name, folder, where["freedom"][0])
-        for f in freedoms
-        if f.name == RESIN_FREEDOM
-        for name in f.values
-    }
+    choices = {f.name: (f.values, row) for f, row in zip(freedoms, not_fixed(free), strict=True)}
+    names, resins = choices.get(RESIN_FREEDOM, ((), top))
+    materials = {name: material if name == resin else _material(name, folder, resins.where) for name in names}
     if body is None and "body" in document:
-        body = read_body(folder / _word(document, "body", "", origin))
-    counts = [v for f in freedoms if f.name == "chambers.count" for v in f.values] or [base.chambers.count]
-    paths = [w.name for w in windows(min(counts))]
-    turned = number(ORIENTATION) if "orientation_deg" in document else None
+        body = read_body(folder / top.word("body"))
+    paths = [w.name for w in windows(min(choices.get("chambers.count", ([base.chambers.count],))[0]))]
+    turned = top.setting(ORIENTATION) if "orientation_deg" in document else None
     targets = read_targets(
-        tables["target"],
-        where["target"],
+        asked,
         Supplies(
             _elongation(material),
             material.density_g_per_ml,
             load_printer(printer),
             paths,
             turned is not None,
-            any(f.name == PATH for f in freedoms),
+            PATH in choices,
             body,
         ),
     )
-    for freedom, place in zip(freedoms, _places_of(freedoms, tables, where), strict=True):
-        for path in freedom.values if freedom.name == PATH else ():
-            if path not in paths:
-                raise InputError(
-                    f"{path!r} is not a path of the unit", f"{place}, values", f"of: {', '.join(paths)}"
-                )
-    settings = MeshSettings(refine=number(settings_of.REFINE))
+    named, row = choices.get(PATH, ((), top))
+    for path in named:
+        if path not in paths:
+            what = f"{path!r} is not a path of the unit"
+            raise row.refusal(what, "values", f"of: {', '.join(paths)}")
+    settings = MeshSettings(refine=top.setting(settings_of.REFINE))
     search = SearchSettings(
-        evaluations=int(number(settings_of.EVALUATIONS)),
-        batch=int(number(settings_of.BATCH)),
-        seed=int(number(settings_of.SEED)),
+        *(top.setting(d) for d in (settings_of.EVALUATIONS, settings_of.BATCH, settings_of.SEED))
     )
     return Design(
         base, tuple(targets), tuple(freedoms), settings,
-        number(settings_of.CHECK_REFINE, min(FINER * settings.refine, settings_of.REFINE.high)), search,
+        top.setting(settings_of.CHECK_REFINE, min(FINER * settings.refine, settings_of.REFINE.high)), search,
         printer, resin,
-        number(settings_of.PRINT_TOLERANCE), number(settings_of.MODULUS_TOLERANCE), document,
-        material, turned, _flag(document, settings_of.ROBUST, text, origin), materials, body,
-        _flag(document, settings_of.SELF_CONTACT, text, origin),
+        top.setting(settings_of.PRINT_TOLERANCE), top.setting(settings_of.MODULUS_TOLERANCE), document,
+        material, turned, top.setting(settings_of.ROBUST), materials, body,
+        top.setting(settings_of.SELF_CONTACT),
     )  # fmt: skip
 
 
@@ -316,87 +262,11 @@ def _material(name: str, folder: Path, where: str) -> Material:
     return found
 
 
-def _places_of(
-    freedoms: list[Freedom], tables: Mapping[str, list[dict[str, Any]]], where: Mapping[str, list[str]]
-) -> list[str]:
-    """File and line of the table of each freedom."""
-    rows = [
-        place
-        for table, place in zip(tables["freedom"], where["freedom"], strict=True)
-        if "fixed" not in table
-    ]
-    return rows[: len(freedoms)]
-
-
-def _unit(document: Mapping[str, Any], origin: str, folder: Path) -> Unit:
-    if ("preset" in document) == ("unit" in document):
+def _unit(top: Row, folder: Path) -> Unit:
+    if ("preset" in top.table) == ("unit" in top.table):
         raise InputError(
-            "no unit is given, or two are", origin, 'write preset = "mu-1.0x" or unit = "my-unit.toml"'
+            "no unit is given, or two are", top.origin, 'write preset = "mu-1.0x" or unit = "my-unit.toml"'
         )
-    if "preset" in document:
-        return load_preset(_word(document, "preset", "", origin))
-    return read_unit(folder / _word(document, "unit", "", origin))
-
-
-def freedoms_in(document: Mapping[str, Any], text: str, origin: str, unit: Unit) -> list[Freedom]:
-    """The freedoms of a document's [[freedom]] tables; text: the document's, for lines. Raises InputError."""
-    tables = _tables(document, "freedom", origin)
-    return read_freedoms(tables, _places(text, "freedom", origin, len(tables)), unit)
-
-
-def _tables(document: Mapping[str, Any], key: str, origin: str) -> list[dict[str, Any]]:
-    found = document.get(key, [])
-    if not isinstance(found, list) or not all(isinstance(table, dict) for table in found):
-        raise InputError(f"{key} is not a list of tables", f"{origin}, {key}", f"begin each with [[{key}]]")
-    return found
-
-
-def _places(text: str, key: str, origin: str, count: int) -> list[str]:
-    """File and line of each [[key]]; of the file alone if the tables are written otherwise."""
-    lines = [n for n, line in enumerate(text.splitlines(), 1) if re.match(rf"\s*\[\[\s*{key}\s*\]\]", line)]
-    if len(lines) != count:
-        return [f"{origin}, {key} {number}" for number in range(1, count + 1)]
-    return [f"{origin}, line {line}" for line in lines]
-
-
-def _line(text: str, key: str) -> str:
-    for number, line in enumerate(text.splitlines(), 1):
-        if re.match(rf"\s*[\"']?{re.escape(key)}[\"']?\s*=", line):
-            return f"line {number}"
-    return "line ?"
-
-
-def _word(document: Mapping[str, Any], key: str, default: str, origin: str) -> str:
-    found = document.get(key, default)
-    if not isinstance(found, str):
-        raise InputError(f"{key} = {found!r} is not offered", f"{origin}, {key}", "write it in quotes")
-    return found
-
-
-def _flag(document: Mapping[str, Any], d: Description, text: str, origin: str) -> bool:
-    found = document.get(d.name, d.default)
-    if not isinstance(found, bool):
-        raise InputError(
-            f"{d.name} = {found!r} is neither true nor false",
-            f"{origin}, {_line(text, d.name)}, {d.name}",
-            "write true or false",
-        )
-    return found
-
-
-@attrs.frozen
-class _Numbers:
-    document: Mapping[str, Any]
-    text: str
-    origin: str
-
-    def __call__(self, d: Description, default: float | None = None) -> float:
-        found = self.document.get(d.name, d.default if default is None else default)
-        kinds = int if d.type is int else (int, float)
-        if isinstance(found, bool) or not isinstance(found, kinds) or not d.low <= found <= d.high:
-            raise InputError(
-                f"{d.name} = {found!r} is out of bounds",
-                f"{self.origin}, {_line(self.text, d.name)}, {d.name}",
-                f"give {'a whole number' if d.type is int else 'a number'} from {d.low:g} to {d.high:g}",
-            )
-        return found
+    if "preset" in top.table:
+        return load_preset(top.word("preset"))
+    return read_unit(folder / top.word("unit"))

@@ -13,8 +13,10 @@ from ..design import grading, wall_factors
 from ..design.grading import CellFactor
 from ..design.parameters import SECTIONS, Unit
 from ..design.quantity import Description, describe
+from ..design.rows import Row
 from ..errors import InputError, did_you_mean
 from ..meshing.settings import OF_CONTINUUM, require_printed
+from ..reading import is_number
 
 SCALE = "scale"
 PATH, RESIN = "path", "resin"
@@ -179,19 +181,17 @@ def changed_unit(unit: Unit, freedoms: Sequence[Freedom], values: Sequence[Any])
     return attrs.evolve(unit, **head, **changed)
 
 
-def read_freedoms(tables: Sequence[Mapping[str, Any]], where: Sequence[str], unit: Unit) -> list[Freedom]:
-    """The freedoms of [[freedom]] tables; those that are fixed only change `fixed_unit`.
+def read_freedoms(rows: Sequence[Row], unit: Unit) -> list[Freedom]:
+    """The freedoms of [[freedom]] tables; those with `fixed` are in the unit already, by `with_fixed`.
 
-    where: file and line of each. Raises InputError that names key and line.
+    Raises InputError that names key and line.
     """
     found: list[Freedom] = []
-    for table, place in zip(tables, where, strict=True):
-        freedom = _freedom(table, place)
-        if freedom is None:
-            continue
+    for row in not_fixed(rows):
+        freedom = _freedom(row)
         if freedom.name in {f.name for f in found}:
-            raise InputError(f"{freedom.name} is listed twice", place, "leave one of the two out")
-        _require_start(freedom, unit, place)
+            raise InputError(f"{freedom.name} is listed twice", row.where, "leave one of the two out")
+        _require_start(freedom, unit, row)
         found.append(freedom)
     if not found:
         raise InputError(
@@ -202,135 +202,109 @@ def read_freedoms(tables: Sequence[Mapping[str, Any]], where: Sequence[str], uni
     return found
 
 
-def fixed_values(tables: Sequence[Mapping[str, Any]], where: Sequence[str]) -> dict[str, Any]:
-    """Values by name of the [[freedom]] tables with `fixed`; raises InputError for an unknown name."""
-    found = {}
-    for table, place in zip(tables, where, strict=True):
-        if "fixed" in table:
-            name, _ = _parameter(table, place)
-            _require_keys(table, ("parameter", "fixed"), place)
-            found[name] = table["fixed"]
-    return found
+def not_fixed(rows: Sequence[Row]) -> list[Row]:
+    """The tables of what is free."""
+    return [row for row in rows if "fixed" not in row.table]
 
 
-def _parameter(table: Mapping[str, Any], where: str) -> tuple[str, Description]:
-    known = parameters()
-    name = table.get("parameter")
-    require_printed(name, f"{where}, parameter")
+def with_fixed(unit: Unit, rows: Sequence[Row]) -> Unit:
+    """The unit with the values of [[freedom]] tables with `fixed`; raises InputError."""
+    fixed = {}
+    for row in rows:
+        if "fixed" in row.table:
+            name = _parameter(row).name
+            row.require_keys(("parameter", "fixed"))
+            fixed[name] = row.table["fixed"]
+    return changed_unit(unit, [Freedom(name) for name in fixed], list(fixed.values()))
+
+
+def _parameter(row: Row) -> Description:
+    """Description of the parameter that a table names, by its dotted name; raises InputError."""
+    known, name = parameters(), row.table.get("parameter")
+    try:
+        require_printed(name, "")
+    except InputError as error:
+        raise row.refusal(error.what, "parameter", error.remedy) from error
     if not isinstance(name, str) or name not in known:
         hint = did_you_mean(name, list(known)) if isinstance(name, str) else ""
-        raise InputError(
+        raise row.refusal(
             f"parameter = {name!r} is not a parameter of a unit{hint}",
-            f"{where}, parameter",
+            "parameter",
             "name it as in a unit's file: chambers.wall_mm, lattice.kind, scale; or path, resin",
         )
-    return name, known[name]
+    return known[name]._replace(name=name)
 
 
-def _require_keys(table: Mapping[str, Any], known: Sequence[str], where: str) -> None:
-    for key in table:
-        if key not in known:
-            raise InputError(
-                f"unknown key {key!r}{did_you_mean(key, known)}",
-                f"{where}, {key}",
-                f"known: {', '.join(known)}",
-            )
-
-
-def _freedom(table: Mapping[str, Any], where: str) -> Freedom | None:
+def _freedom(row: Row) -> Freedom:
+    table = row.table
     if table.get("parameter") in (PATH, RESIN):
-        return _choice(table, where)
-    name, d = _parameter(table, where)
-    if "fixed" in table:
-        return None
+        row.require_keys(("parameter", "values"))
+        return Freedom(table["parameter"], values=_values(row, str))
+    d = _parameter(row)
     for listed in FACTOR_LISTS:
-        if name == listed.name and listed.key in table:
-            return _of_factor(listed, table, where)
-    _require_keys(table, ("parameter", "low", "high", "values", "also"), where)
-    also = _also(table.get("also", {}), where)
+        if d.name == listed.name and listed.key in table:
+            return _of_factor(listed, row)
+    row.require_keys(("parameter", "low", "high", "values", "also"))
+    also = _also(row)
     if "values" in table:
-        values = table["values"]
-        if "low" in table or "high" in table or not isinstance(values, list) or not values:
-            raise InputError(
-                f"{name} has both bounds and values, or an empty list", f"{where}, values",
-                "write values = [..] alone, or low and high",
-            )  # fmt: skip
-        return Freedom(name, values=tuple(dict.fromkeys(values)), also=also, unit=d.unit)
-    low, high = table.get("low"), table.get("high")
-    for key, value in (("low", low), ("high", high)):
-        if isinstance(value, bool) or not isinstance(value, int | float) or not math.isfinite(value):
-            raise InputError(
-                f"{key} = {value!r} of {name} is not a number",
-                f"{where}, {key}",
-                "write low = .. and high = ..",
-            )
-    assert isinstance(low, int | float)
-    assert isinstance(high, int | float)
+        row.refuse(("low", "high"), f"{d.name} has values")
+        return Freedom(d.name, values=_values(row), also=also, unit=d.unit)
     if d.type not in (float, int):
-        raise InputError(f"{name} has no range", f"{where}, low", f"write values = [..] of {d.allowed}")
-    if not d.low <= low < high <= d.high:
-        raise InputError(
-            f"low = {low:g} and high = {high:g} of {name} are not a range within its bounds",
-            f"{where}, low",
-            f"choose from {d.low:g} to {d.high:g} {d.unit}".rstrip(),
-        )
-    if d.type is int:
-        if low != int(low) or high != int(high):
-            raise InputError(f"{name} is a whole number", f"{where}, low", "give whole numbers")
-        return Freedom(name, values=tuple(range(int(low), int(high) + 1)), also=also, unit=d.unit)
-    return Freedom(name, float(low), float(high), also=also, unit=d.unit)
+        raise row.refusal(f"{d.name} has no range", "low", f"write values = [..] of {d.allowed}")
+    low, high = _range(row, d.low, d.high, f"{d.name} are not a range within its bounds", d.unit)
+    if d.type is not int:
+        return Freedom(d.name, low, high, also=also, unit=d.unit)
+    if low != int(low) or high != int(high):
+        raise row.refusal(f"{d.name} is a whole number", "low", "give whole numbers")
+    return Freedom(d.name, values=tuple(range(int(low), int(high) + 1)), also=also, unit=d.unit)
 
 
-def _choice(table: Mapping[str, Any], where: str) -> Freedom:
-    """The freedom of a path or a resin; raises InputError where its values are not names."""
-    name = str(table["parameter"])
-    _require_keys(table, ("parameter", "values"), where)
-    values = table.get("values")
-    if not isinstance(values, list) or not values or not all(isinstance(v, str) for v in values):
-        example = '["alpha4", "alpha7"]' if name == PATH else '["elastic-50a-v1", "my-resin.toml"]'
-        raise InputError(f"{name} has no list of names", f"{where}, values", f"write values = {example}")
-    return Freedom(name, values=tuple(dict.fromkeys(values)))
+def _values(row: Row, kind: type = object) -> tuple[Any, ...]:
+    """The list of values; raises InputError where it is none, or empty, or one is of another kind."""
+    values = row.table.get("values")
+    if not isinstance(values, list) or not values or not all(isinstance(v, kind) for v in values):
+        name, words = row.table["parameter"], "names" if kind is str else "values"
+        raise row.refusal(f"{name} has no list of {words}", "values", "write values = [.., ..]")
+    return tuple(dict.fromkeys(values))
 
 
-def _of_factor(listed: FactorList, table: Mapping[str, Any], where: str) -> Freedom:
+def _range(row: Row, least: float, most: float, of: str, unit: str = "") -> tuple[float, float]:
+    """The bounds that a table gives; raises InputError where they are no range within others."""
+    low, high = row.number("low"), row.number("high")
+    if not least <= low < high <= most:
+        remedy = f"choose from {least:g} to {most:g} {unit}".rstrip()
+        raise row.refusal(f"low = {low:g} and high = {high:g} of {of}", "low", remedy)
+    return low, high
+
+
+def _of_factor(listed: FactorList, row: Row) -> Freedom:
     """The factor at the place that a table names; raises InputError."""
-    _require_keys(table, ("parameter", listed.key, "low", "high"), where)
-    given, low, high = (table.get(key) for key in (listed.key, "low", "high"))
-    place = str(given) if isinstance(given, str | int) and not isinstance(given, bool) else "?"
+    row.require_keys(("parameter", listed.key, "low", "high"))
+    given = row.table[listed.key]
     what, example = listed.place
+    place = str(given) if type(given) in (str, int) else "?"
     try:
         place = listed.canonical(place if ";" not in place else "?")
     except InputError as error:
-        raise InputError(
-            f"{listed.key} = {given!r} does not give {what}",
-            f"{where}, {listed.key}",
-            f'write {listed.key} = "{example}"',
+        raise row.refusal(
+            f"{listed.key} = {given!r} does not give {what}", listed.key, f'write {listed.key} = "{example}"'
         ) from error
-    good = all(isinstance(v, int | float) and not isinstance(v, bool) for v in (low, high))
-    if not good or not listed.low <= low < high <= listed.high:  # type: ignore[operator]
-        raise InputError(
-            f"low = {low!r} and high = {high!r} of {listed.key} {place} are not a range of factors",
-            f"{where}, low",
-            f"choose from {listed.low:g} to {listed.high:g}",
+    low, high = _range(row, listed.low, listed.high, f"{listed.key} {place} are not a range of factors")
+    return Freedom(f"{listed.name}[{place}]", low, high)
+
+
+def _also(row: Row) -> dict[str, float]:
+    given, known = row.table.get("also", {}), parameters()
+    if not isinstance(given, dict) or not all(n in known and is_number(f) for n, f in given.items()):
+        raise row.refusal(
+            f"also = {given!r} is not a table of parameters and factors",
+            "also",
+            'write { "chambers.bladder_diameter_mm" = 2.0 }',
         )
-    return Freedom(f"{listed.name}[{place}]", float(low), float(high))  # type: ignore[arg-type]
-
-
-def _also(given: Any, where: str) -> dict[str, float]:
-    known = parameters()
-    if not isinstance(given, dict):
-        raise InputError(f"also = {given!r} is not a table", f"{where}, also", 'write { "a.b" = 2.0 }')
-    for name, factor in given.items():
-        if name not in known or isinstance(factor, bool) or not isinstance(factor, int | float):
-            raise InputError(
-                f"also: {name} = {factor!r} is not a parameter and a factor",
-                f"{where}, also",
-                'write { "chambers.bladder_diameter_mm" = 2.0 }',
-            )
     return {name: float(factor) for name, factor in given.items()}
 
 
-def _require_start(freedom: Freedom, unit: Unit, where: str) -> None:
+def _require_start(freedom: Freedom, unit: Unit, row: Row) -> None:
     """Raise InputError for a value that the parameter may not have."""
     if not freedom.is_of_unit:
         return
@@ -338,15 +312,12 @@ def _require_start(freedom: Freedom, unit: Unit, where: str) -> None:
         try:
             changed_unit(unit, [freedom], [freedom.low])
         except InputError as error:
-            raise InputError(error.what, f"{where}, {entry[0].key}", error.remedy) from error
+            raise row.refusal(error.what, entry[0].key, error.remedy) from error
         return
     d = parameters()[freedom.name]
     for value in freedom.values:
         fits = type(value) is d.type or (d.type is float and type(value) is int)
         within = value in d.choices if d.choices else d.type is bool or (fits and d.low <= value <= d.high)
         if not (fits and within):
-            raise InputError(
-                f"{value!r} is not a value of {freedom.name}",
-                f"{where}, values",
-                f"choose {d.allowed or 'true or false'}",
-            )
+            what = f"{value!r} is not a value of {freedom.name}"
+            raise row.refusal(what, "values", f"choose {d.allowed or 'true or false'}")

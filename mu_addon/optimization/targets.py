@@ -3,13 +3,15 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from typing import Any, Literal
 
 import attrs
 
 from ..design.body import Body
-from ..errors import InputError, did_you_mean
+from ..design.rows import Row
+from ..errors import InputError
+from ..meshing.mesh import AXES
 from ..reading import is_finite
 from .quantities import (
     AirVolume,
@@ -27,29 +29,12 @@ from .unit_quantities import Mass, PrintTime, WallThickness
 
 Goal = Literal["minimise", "maximise"]
 
-# Keys of each kind besides those of `_FORM`, and the unit of its value.
-KINDS: dict[str, tuple[tuple[str, ...], str]] = {
-    "angle": (("pressure_kPa",), "deg"),
-    "tip_force": (("pressure_kPa", "gap_mm"), "N"),
-    "tip_position": (("pressure_kPa", "direction"), "mm"),
-    "workspace": (("pressures_kPa",), "mm"),
-    "stiffness": (("direction",), "N/mm"),
-    "stretch": (("pressure_kPa", "region"), ""),
-    "safety": (("pressure_kPa", "region"), ""),
-    "air_volume": (("pressure_kPa",), "ml"),
-    "mass": ((), "g"),
-    "print_time": ((), "h"),
-    "wall_thickness": ((), "mm"),
-    "deviation": (("pressures_kPa", "path"), "mm"),
-    "sensor_slope": (("pressures_kPa", "path"), "1/deg"),
-    "walls_apart": (("pressure_kPa",), ""),
-    "printable": ((), ""),
-}
 _FORM = ("kind", "name", "value", "tolerance", "low", "high", "objective", "points")
 NARROW = 0.02
 """One unit of misfit of a bound without a tolerance, as a share of the bound."""
 HIGHEST_kPa = 500.0
 FARTHEST_WALL_MM = 200.0
+YES_OR_NO = ("walls_apart", "printable")
 
 
 @attrs.frozen
@@ -98,7 +83,7 @@ class Target:
     def words(self) -> str:
         """The target as text."""
         unit = f" {self.unit}" if self.unit else ""
-        if self.kind in ("walls_apart", "printable"):
+        if self.kind in YES_OR_NO:
             return "yes"
         if self.goal is not None:
             return "as small as possible" if self.goal == "minimise" else "as large as possible"
@@ -129,21 +114,17 @@ class Supplies:
     body: Body | None = None
 
 
-def read_targets(
-    tables: Sequence[Mapping[str, Any]], where: Sequence[str], supplies: Supplies
-) -> list[Target]:
-    """The targets of [[target]] tables; where: file and line of each.
+def read_targets(rows: Sequence[Row], supplies: Supplies) -> list[Target]:
+    """The targets of [[target]] tables.
 
     A curve of points is a target a point. `printable` adds the printer's least wall as a bound for the
     search. Raises InputError that names key and line.
     """
     found: list[Target] = []
-    for table, place in zip(tables, where, strict=True):
-        for target in _targets(table, place, supplies):
+    for row in rows:
+        for target in _targets(row, supplies):
             if target.name in {t.name for t in found}:
-                raise InputError(
-                    f"two targets are named {target.name!r}", f"{place}, name", "give one of them a name"
-                )
+                raise row.refusal(f"two targets are named {target.name!r}", "name", "give one of them a name")
             found.append(target)
     found += [_of_printer(t, supplies) for t in found if t.kind == "printable"]
     if not any(t.kind not in ("printable", "wall_thickness") for t in found):
@@ -163,203 +144,183 @@ def _of_printer(printable: Target, supplies: Supplies) -> Target:
     )  # fmt: skip
 
 
-def _targets(table: Mapping[str, Any], where: str, supplies: Supplies) -> list[Target]:
-    kind = table.get("kind")
-    if not isinstance(kind, str) or kind not in KINDS:
-        hint = did_you_mean(kind, list(KINDS)) if isinstance(kind, str) else ""
-        raise InputError(
-            f"kind = {kind!r} is not known{hint}", f"{where}, kind", f"one of: {', '.join(KINDS)}"
-        )
-    known = (*_FORM, *KINDS[kind][0])
-    for key in table:
-        if key not in known:
-            raise InputError(
-                f"unknown key {key!r} of {kind}{did_you_mean(key, known)}", f"{where}, {key}",
-                f"known: {', '.join(known)}",
-            )  # fmt: skip
-    if "points" in table:
-        return _curve(table, where, supplies)
-    name = table.get("name", _name(kind, table))
+def _targets(row: Row, supplies: Supplies) -> list[Target]:
+    kind = row.one_of("kind", list(KINDS))
+    row.require_keys((*_FORM, *KINDS[kind].keys), f" of {kind}")
+    if "points" in row.table:
+        return _curve(row, supplies)
+    name = row.table.get("name", _name(kind, row.table))
     if not isinstance(name, str) or not name.strip() or len(name) > 60 or not name.isprintable():
-        raise InputError(f"name = {name!r} is not a name", f"{where}, name", "write a short text in quotes")
-    quantity = _quantity(kind, name, table, where, supplies)
-    if kind in ("walls_apart", "printable"):
-        _refuse(table, ("value", "tolerance", "low", "high", "objective"), where, f"{kind} is a yes or a no")
-        return [Target(name, kind, "", quantity, tolerance=1.0, low=1.0, line=where)]
-    return [Target(name, kind, KINDS[kind][1], quantity, **_asked(table, where, kind), line=where)]
+        raise row.refusal(f"name = {name!r} is not a name", "name", "write a short text in quotes")
+    quantity, unit = KINDS[kind].made(_Asked(row, kind, name, supplies)), KINDS[kind].unit
+    if kind in YES_OR_NO:
+        row.refuse(("value", "tolerance", "low", "high", "objective"), f"{kind} is a yes or a no")
+        return [Target(name, kind, unit, quantity, tolerance=1.0, low=1.0, line=row.where)]
+    return [Target(name, kind, unit, quantity, **_goal(row, kind), line=row.where)]
 
 
 def _name(kind: str, table: Mapping[str, Any]) -> str:
     """A name from the quantity and its pressure or axis: "angle at 30 kPa", "stiffness along x"."""
     words = kind.replace("_", " ")
-    if "region" in table:
-        words += f" of {table['region']}"
-    if "path" in table:
-        words += f" of {table['path']}"
-    if "pressure_kPa" in table:
-        words += f" at {table['pressure_kPa']:g} kPa" if is_finite(table["pressure_kPa"]) else ""
-    if "gap_mm" in table:
-        words += f" on a wall at {table['gap_mm']:g} mm" if is_finite(table["gap_mm"]) else ""
-    return f"{words} along {table['direction']}" if "direction" in table else words
+    for key, before, unit in (
+        ("region", "of", ""), ("path", "of", ""), ("pressure_kPa", "at", " kPa"),
+        ("gap_mm", "on a wall at", " mm"), ("direction", "along", ""),
+    ):  # fmt: skip
+        value = table.get(key)
+        if unit and is_finite(value):
+            words += f" {before} {value:g}{unit}"
+        elif not unit and key in table:
+            words += f" {before} {value}"
+    return words
 
 
-def _asked(table: Mapping[str, Any], where: str, kind: str) -> dict[str, Any]:
-    goal = table.get("objective")
-    has_bound = "low" in table or "high" in table
-    if ("value" in table) + has_bound + (goal is not None) != 1:
+def _goal(row: Row, kind: str) -> dict[str, Any]:
+    """Goal, or value or bounds with their tolerance; raises InputError."""
+    table = row.table
+    bounds = [key for key in ("low", "high") if key in table]
+    if ("value" in table) + bool(bounds) + ("objective" in table) != 1:
         raise InputError(
-            f"{kind} must have either value and tolerance, or low and high, or objective", where,
+            f"{kind} must have either value and tolerance, or low and high, or objective", row.where,
             'write value = 40, tolerance = 1; or low = 40; or objective = "minimise"',
         )  # fmt: skip
-    if goal is not None:
-        if goal not in ("minimise", "maximise"):
-            raise InputError(
-                f"objective = {goal!r} is not known", f"{where}, objective", '"minimise" or "maximise"'
-            )
-        _refuse(table, ("tolerance",), where, "an objective has no tolerance")
-        return {"goal": goal}
-    if "value" in table:
-        if "tolerance" not in table:
-            raise InputError("a value has no tolerance", f"{where}, tolerance", "write tolerance = ..")
-        found = {key: _number(table, key, where) for key in ("value", "tolerance")}
-    else:
-        found = {key: _number(table, key, where) for key in ("low", "high") if key in table}
-        if found.get("low", -math.inf) >= found.get("high", math.inf):
-            raise InputError("low is not below high", f"{where}, low", "exchange the two")
-        largest = max(abs(v) for v in found.values())
-        found["tolerance"] = (
-            _number(table, "tolerance", where) if "tolerance" in table else NARROW * (largest or 1.0)
-        )
+    if "objective" in table:
+        row.refuse(("tolerance",), "an objective has no tolerance")
+        return {"goal": row.one_of("objective", ("minimise", "maximise"))}
+    if "value" in table and "tolerance" not in table:
+        raise row.refusal("a value has no tolerance", "tolerance", "write tolerance = ..")
+    found = {key: row.number(key) for key in bounds or ("value",)}
+    if found.get("low", -math.inf) >= found.get("high", math.inf):
+        raise row.refusal("low is not below high", "low", "exchange the two")
+    usual = NARROW * (max(abs(v) for v in found.values()) or 1.0)
+    found["tolerance"] = row.number("tolerance") if "tolerance" in table else usual
     if found["tolerance"] <= 0:
-        raise InputError(
-            f"tolerance = {found['tolerance']:g} is not positive", f"{where}, tolerance", "give more than 0"
-        )
+        what = f"tolerance = {found['tolerance']:g} is not positive"
+        raise row.refusal(what, "tolerance", "give more than 0")
     return found
 
 
-def _curve(table: Mapping[str, Any], where: str, supplies: Supplies) -> list[Target]:
+def _curve(row: Row, supplies: Supplies) -> list[Target]:
     """A target at every point (pressure in kPa, value) of a curve."""
-    points = table["points"]
+    points, kind = row.table["points"], row.table["kind"]
     good = isinstance(points, list) and len(points) >= 2
     if not good or not all(isinstance(p, list) and len(p) == 2 and all(map(is_finite, p)) for p in points):
-        raise InputError(
-            f"points = {points!r} is not a curve", f"{where}, points", "write [[-15, -20], [30, 40]]"
-        )
-    if "pressure_kPa" not in KINDS[table["kind"]][0]:
-        raise InputError(f"{table['kind']} has no curve", f"{where}, points", "give a value")
-    _refuse(table, ("value", "low", "high", "objective", "pressure_kPa"), where, "points give it already")
-    rest = {key: v for key, v in table.items() if key not in ("points", "name")}
+        raise row.refusal(f"points = {points!r} is not a curve", "points", "write [[-15, -20], [30, 40]]")
+    if "pressure_kPa" not in KINDS[kind].keys:
+        raise row.refusal(f"{kind} has no curve", "points", "give a value")
+    row.refuse(("value", "low", "high", "objective", "pressure_kPa"), "points give it already")
+    rest = {key: v for key, v in row.table.items() if key not in ("points", "name")}
     return [
         target
         for pressure, value in points
-        for target in _targets({**rest, "pressure_kPa": pressure, "value": value}, where, supplies)
+        for target in _targets(
+            attrs.evolve(row, table={**rest, "pressure_kPa": pressure, "value": value}), supplies
+        )
     ]
 
 
-def _quantity(
-    kind: str, name: str, table: Mapping[str, Any], where: str, supplies: Supplies
-) -> Quantity | None:
-    if kind == "printable":
-        return None
-    if kind == "mass":
-        return Mass(name, supplies.density_g_per_ml, supplies.printer, body=supplies.body)
-    if kind == "print_time":
-        return PrintTime(name, supplies.printer)
-    if kind == "wall_thickness":
-        return WallThickness(name)
-    if kind == "stiffness":
-        direction = table.get("direction")
-        if direction not in ("x", "y", "z"):
-            raise InputError(
-                f"direction = {direction!r} is not an axis", f"{where}, direction", 'write "x", "y" or "z"'
-            )
-        return RestStiffness(name, direction)
-    if kind == "workspace":
-        return Workspace(name, _pressures(table, where))
-    if kind in ("deviation", "sensor_slope"):
-        pressures, path = _pressures(table, where), table.get("path")
-        if path is None and supplies.path_is_free:
-            path = ""
-        elif path not in supplies.paths:
-            raise InputError(
-                f"path = {path!r} is not a path of the unit", f"{where}, path",
-                f"one of: {', '.join(supplies.paths)}; left out where the path is a freedom",
+@attrs.frozen
+class _Asked:
+    """The table of a target: the values of its quantity, which raise InputError."""
+
+    row: Row
+    kind: str
+    name: str
+    supplies: Supplies
+
+    def pressure(self, rest: bool = False) -> float:
+        """A pressure in kPa. rest: it may be 0."""
+        found = self.row.number("pressure_kPa", -HIGHEST_kPa, HIGHEST_kPa, "kPa")
+        if found == 0 and not rest:
+            raise self.row.refusal(
+                f"{self.kind} at 0 kPa is that of the unit at rest", "pressure_kPa",
+                "give another; with orientation_deg, under its weight, an angle or a tip position may be at "
+                "0",
             )  # fmt: skip
-        made = Disturbance if kind == "deviation" else SensorSlope
-        return made(name, str(path), pressures)
-    pressure = 0.0 if kind == "air_volume" and "pressure_kPa" not in table else _pressure(table, where)
-    if kind == "air_volume":
-        return AirVolume(name, pressure)
-    if pressure == 0 and not (supplies.has_gravity and kind in ("angle", "tip_position")):
-        raise InputError(
-            f"{kind} at 0 kPa is that of the unit at rest", f"{where}, pressure_kPa",
-            "give another; with orientation_deg, under its weight, an angle or a tip position may be at 0",
-        )  # fmt: skip
-    if kind == "angle":
-        return Angle(name, pressure)
-    if kind == "tip_force":
-        return _tip_force(name, pressure, table, where)
-    if kind == "tip_position":
-        direction = table.get("direction", "y")
-        if direction not in ("y", "z"):
-            raise InputError(
-                f"the tip does not move in direction = {direction!r}", f"{where}, direction",
-                'write "y", toward which it bends, or "z", along the axis',
+        return found
+
+    @property
+    def bent(self) -> float:
+        """A pressure in kPa that bends the unit, or 0 where its weight does."""
+        return self.pressure(self.supplies.has_gravity)
+
+    @property
+    def pressures(self) -> tuple[float, ...]:
+        """Pressures in kPa, without 0."""
+        given = self.row.table.get("pressures_kPa")
+        if not isinstance(given, list) or not given or not all(is_finite(p) for p in given):
+            what = f"pressures_kPa = {given!r} is not a list of pressures"
+            raise self.row.refusal(what, "pressures_kPa", "write pressures_kPa = [-15, 30]")
+        found = tuple(sorted({float(p) for p in given} - {0.0}))
+        if not found or max(map(abs, found)) > HIGHEST_kPa:
+            raise self.row.refusal(
+                f"pressures_kPa = {given!r} is out of bounds, or 0 alone", "pressures_kPa",
+                f"give {-HIGHEST_kPa:g} to {HIGHEST_kPa:g} kPa",
             )  # fmt: skip
-        return TipPosition(name, pressure, str(direction))
-    if kind == "walls_apart":
-        return WallsApart(name, pressure)
-    region = table.get("region", "wall")
-    if region not in ("wall", "struts"):
-        raise InputError(f"region = {region!r} is not known", f"{where}, region", 'write "wall" or "struts"')
-    return Stretch(name, pressure, region, supplies.elongation if kind == "safety" else None)
+        return found
+
+    @property
+    def path(self) -> str:
+        """A path of the unit, "" where it is free."""
+        if self.supplies.path_is_free and "path" not in self.row.table:
+            return ""
+        return self.row.one_of("path", self.supplies.paths, why="not a path of the unit")
+
+    @property
+    def region(self) -> str:
+        """Wall or struts."""
+        return self.row.one_of("region", ("wall", "struts"), "wall")
 
 
-def _tip_force(name: str, pressure: float, table: Mapping[str, Any], where: str) -> TipForce:
-    gap = _number(table, "gap_mm", where) if "gap_mm" in table else 0.0
-    if pressure < 0:
-        raise InputError(
-            "the wall is on the side toward which pressure bends the unit", f"{where}, pressure_kPa",
+def _tip_force(asked: _Asked) -> TipForce:
+    if asked.pressure() < 0:
+        raise asked.row.refusal(
+            "the wall is on the side toward which pressure bends the unit", "pressure_kPa",
             "give a pressure above 0",
         )  # fmt: skip
-    if not 0 <= gap <= FARTHEST_WALL_MM:
-        raise InputError(
-            f"gap_mm = {gap:g} is out of bounds", f"{where}, gap_mm", f"give 0 to {FARTHEST_WALL_MM:g} mm"
-        )
-    return TipForce(name, pressure, gap)
+    gap = asked.row.number("gap_mm", 0.0, FARTHEST_WALL_MM, "mm") if "gap_mm" in asked.row.table else 0.0
+    return TipForce(asked.name, asked.pressure(), gap)
 
 
-def _refuse(table: Mapping[str, Any], keys: Sequence[str], where: str, why: str) -> None:
-    for key in keys:
-        if key in table:
-            raise InputError(f"{why}: {key} does not apply there", f"{where}, {key}", "leave it out")
+def _tip_position(asked: _Asked) -> TipPosition:
+    pressure = asked.bent
+    direction = asked.row.one_of("direction", ("y", "z"), "y", "one that the tip does not move in")
+    return TipPosition(asked.name, pressure, direction)
 
 
-def _pressures(table: Mapping[str, Any], where: str) -> tuple[float, ...]:
-    given = table.get("pressures_kPa")
-    if not isinstance(given, list) or not given or not all(is_finite(p) for p in given):
-        raise InputError(
-            f"pressures_kPa = {given!r} is not a list of pressures", f"{where}, pressures_kPa",
-            "write pressures_kPa = [-15, 30]",
-        )  # fmt: skip
-    found = tuple(sorted({_pressure({"pressure_kPa": p}, where) for p in given} - {0.0}))
-    if not found:
-        raise InputError("no pressure differs from 0", f"{where}, pressures_kPa", "give one")
-    return found
+@attrs.frozen
+class Kind:
+    """A kind of target: unit of its value, its keys besides those of every kind, its quantity from these."""
+
+    unit: str
+    keys: tuple[str, ...]
+    made: Callable[[_Asked], Quantity | None]
 
 
-def _pressure(table: Mapping[str, Any], where: str) -> float:
-    found = _number(table, "pressure_kPa", where)
-    if abs(found) > HIGHEST_kPa:
-        raise InputError(
-            f"pressure_kPa = {found:g} is out of bounds", f"{where}, pressure_kPa",
-            f"give {-HIGHEST_kPa:g} to {HIGHEST_kPa:g} kPa",
-        )  # fmt: skip
-    return found
-
-
-def _number(table: Mapping[str, Any], key: str, where: str) -> float:
-    value = table.get(key)
-    if not is_finite(value):
-        raise InputError(f"{key} = {value!r} is not a number", f"{where}, {key}", f"write {key} = ..")
-    return float(value)  # type: ignore[arg-type]
+_AT, _AT_SOME = ("pressure_kPa",), ("pressures_kPa", "path")
+KINDS: dict[str, Kind] = {
+    "angle": Kind("deg", _AT, lambda a: Angle(a.name, a.bent)),
+    "tip_force": Kind("N", (*_AT, "gap_mm"), _tip_force),
+    "tip_position": Kind("mm", (*_AT, "direction"), _tip_position),
+    "workspace": Kind("mm", ("pressures_kPa",), lambda a: Workspace(a.name, a.pressures)),
+    "stiffness": Kind(
+        "N/mm", ("direction",),
+        lambda a: RestStiffness(a.name, a.row.one_of("direction", AXES, why="not an axis")),
+    ),
+    "stretch": Kind("", (*_AT, "region"), lambda a: Stretch(a.name, a.pressure(), a.region)),
+    "safety": Kind(
+        "", (*_AT, "region"), lambda a: Stretch(a.name, a.pressure(), a.region, a.supplies.elongation)
+    ),
+    "air_volume": Kind(
+        "ml", _AT,
+        lambda a: AirVolume(a.name, a.pressure(rest=True) if "pressure_kPa" in a.row.table else 0.0),
+    ),
+    "mass": Kind(
+        "g", (), lambda a: Mass(a.name, a.supplies.density_g_per_ml, a.supplies.printer, body=a.supplies.body)
+    ),
+    "print_time": Kind("h", (), lambda a: PrintTime(a.name, a.supplies.printer)),
+    "wall_thickness": Kind("mm", (), lambda a: WallThickness(a.name)),
+    "deviation": Kind("mm", _AT_SOME, lambda a: Disturbance(a.name, a.path, a.pressures)),
+    "sensor_slope": Kind("1/deg", _AT_SOME, lambda a: SensorSlope(a.name, a.path, a.pressures)),
+    "walls_apart": Kind("", _AT, lambda a: WallsApart(a.name, a.pressure())),
+    "printable": Kind("", (), lambda a: None),
+}  # fmt: skip

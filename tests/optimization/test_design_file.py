@@ -273,7 +273,7 @@ def test_what_follows_a_freedom_changes_with_it():
         (HEAD + ANGLE + CELL, "does not give column, row and chamber", "line 9"),
         (HEAD + ANGLE + CELL.replace('"0 2"', '"0 2 *"').replace("1.3", "3"), "not a range of", "line 10"),
         (HEAD + ANGLE + CELL.replace('"0 2"', '"0 9 *"'), "0 9 *", "line 9"),
-        (HEAD + "robust = 1\n" + ANGLE + WALL, "neither true nor false", "line 3"),
+        (HEAD + "robust = 1\n" + ANGLE + WALL, "is not true or false", "line 3"),
         (HEAD + "orientation_deg = 400\n" + ANGLE + WALL, "out of bounds", "line 3"),
     ],
 )  # fmt: skip

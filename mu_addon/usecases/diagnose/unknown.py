@@ -13,6 +13,7 @@ import numpy as np
 
 from ...design.parameters import Unit
 from ...design.quantity import described
+from ...design.rows import rows_of, top_of
 from ...errors import InputError
 from ...evidence.diagnosis import noise_of
 from ...evidence.drawn import Designs, Surface, require_enough
@@ -23,9 +24,8 @@ from ...evidence.record import record
 from ...evidence.simulator import Composite
 from ...files import write_csv
 from ...measured import Experiment
-from ...optimization.design_file import freedoms_in
-from ...optimization.freedoms import Freedom, changed_unit
-from ...reading import file_text, parse_toml
+from ...optimization.freedoms import Freedom, changed_unit, read_freedoms
+from ...reading import parse_toml, text_of
 
 Array = np.ndarray[Any, Any]
 
@@ -131,17 +131,10 @@ def _at(freedom: Freedom, place: float) -> Any:
 def read_unknown(text: str, origin: str, unit: Unit) -> Unknown:
     """The unknown parameters of a file's text, of a unit; raises InputError."""
     document = parse_toml(text, origin)
-    for key in document:
-        if key not in ("designs", "freedom"):
-            raise InputError(f"unknown key {key!r}", f"{origin}, {key}", "known: designs, freedom")
-    count = document.get("designs", COUNT.default)
-    if isinstance(count, bool) or not isinstance(count, int) or not COUNT.low <= count <= COUNT.high:
-        raise InputError(
-            f"designs = {count!r}",
-            f"{origin}, designs",
-            f"write a number from {COUNT.low:g} to {COUNT.high:g}",
-        )
-    freedoms = freedoms_in(document, text, origin, unit)
+    top = top_of(document, text, origin)
+    top.require_keys(("designs", "freedom"))
+    count = top.setting(COUNT)
+    freedoms = read_freedoms(rows_of(document, text, origin, "freedom"), unit)
     for f in freedoms:
         numbers = all(type(v) in (int, float) for v in f.values)
         if f.name.partition(".")[0] not in SECTIONS or not numbers:
@@ -157,12 +150,8 @@ def read_unknown(text: str, origin: str, unit: Unit) -> Unknown:
 
 def unknown_of(path: Path, unit: Unit) -> Unknown:
     """The unknown parameters of a file; raises InputError."""
-    try:
-        return read_unknown(file_text(path), str(path), unit)
-    except (OSError, UnicodeDecodeError) as error:
-        raise InputError(
-            f"cannot read {path}: {error}", str(path), "give a file of [[freedom]] tables"
-        ) from error
+    text = text_of(path, "unknown parameters", "give a file of [[freedom]] tables")
+    return read_unknown(text, str(path), unit)
 
 
 @attrs.frozen(eq=False)
