@@ -80,7 +80,7 @@ def file_text(path: str | Path, most: int = _LONGEST) -> str:
     return file_bytes(path, most).decode("utf-8-sig").replace("\r\n", "\n").replace("\r", "\n")
 
 
-def text_of(path: str | Path, what: str, remedy: str, most: int = _LONGEST) -> str:
+def read_text(path: str | Path, what: str, remedy: str, most: int = _LONGEST) -> str:
     """The text of a file as of `file_text`; raises InputError. what: the file's, as "design"."""
     try:
         return file_text(path, most)

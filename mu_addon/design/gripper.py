@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..errors import InputError
-from ..reading import file_text
+from ..reading import read_text
 from . import shapes, toml_text
 from .anchors import window
 from .assets import asset_file, asset_names
@@ -328,14 +328,7 @@ def from_toml(text: str, origin: str = "", beside: Path | None = None) -> Grippe
 def read_gripper(path: str | Path) -> Gripper:
     """The gripper in a TOML file. Raises InputError with file, line and remedy."""
     path = Path(path)
-    try:
-        text = file_text(path)
-    except OSError as error:
-        raise InputError(
-            f"cannot read the gripper: {error.strerror or error}", str(path), "give a gripper's TOML file"
-        ) from error
-    except UnicodeDecodeError as error:
-        raise InputError("the file is not UTF-8 text", str(path), "save it as UTF-8") from error
+    text = read_text(path, "gripper", "give a gripper's TOML file")
     return from_toml(text, str(path), path.parent)
 
 

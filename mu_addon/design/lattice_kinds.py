@@ -19,7 +19,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from ..errors import InputError
-from ..reading import file_text
+from ..reading import read_text
 from .assets import asset_file, asset_names
 from .toml_text import parse
 
@@ -224,10 +224,7 @@ def kind(name: str, struts: str = "") -> LatticeKind:
 
 def read_struts(path: Path) -> str:
     """The canonical text of the struts in a file of a lattice kind. Raises InputError."""
-    try:
-        text = file_text(path)
-    except (OSError, UnicodeDecodeError) as error:
-        raise InputError(f"cannot read the lattice kind: {error}", str(path), "give a TOML file") from error
+    text = read_text(path, "lattice kind", "give a TOML file")
     struts = parse(text, {"": ("struts",)}, str(path)).get("struts")
     if not isinstance(struts, str):
         raise InputError("there are no struts", str(path), f"write struts = {_EXAMPLE}")

@@ -12,7 +12,7 @@ import attrs
 
 from ..errors import InputError, did_you_mean
 from ..files import write_bytes
-from ..reading import file_text
+from ..reading import read_text
 from . import lattice_kinds, rules, toml_text
 from .assets import asset_file, asset_names
 from .dimensions import Dimensions
@@ -626,16 +626,7 @@ def _take_kind(lattice: dict[str, Any], folder: Path) -> None:
 def read_unit(path: str | Path) -> Unit:
     """The unit in a TOML file. Raises InputError with file, line and remedy."""
     path = Path(path)
-    try:
-        text = file_text(path)
-    except OSError as error:
-        raise InputError(
-            f"cannot read the unit: {error.strerror or error}",
-            str(path),
-            "give the path of a unit's TOML file",
-        ) from error
-    except UnicodeDecodeError as error:
-        raise InputError("the file is not UTF-8 text", str(path), "save it as UTF-8") from error
+    text = read_text(path, "unit", "give the path of a unit's TOML file")
     return from_toml(text, str(path), path.parent)
 
 

@@ -12,7 +12,7 @@ import attrs
 from ..errors import InputError
 from ..files import write_text
 from ..homogenize.offset_response import OffsetResponse
-from ..reading import file_text, is_number, parse_toml
+from ..reading import is_number, parse_toml, read_text
 from ..toml_writer import Commented, toml_text
 from .effect import SLIP, Parameter
 from .effects import DECLARED
@@ -138,14 +138,7 @@ def load_model(path: Path) -> ExtendedModel:
     Raises InputError if the file cannot be read, is not TOML or lacks a verdict; for a table of another type,
     an effect that is not declared, a parameter without a finite value and an unusable table [lattice].
     """
-    try:
-        text = file_text(path)
-    except OSError as error:
-        raise InputError(
-            f"cannot read {path}: {error.strerror}", str(path), "run `diagnose` on a folder first"
-        ) from error
-    except UnicodeDecodeError as error:
-        raise InputError("the model is not UTF-8 text", str(path), "give a model.toml") from error
+    text = read_text(path, "model", "run `diagnose` on a folder first")
     document = parse_toml(text, str(path))
     if not isinstance(document.get("verdict"), str):
         raise InputError("this is no model: it has no verdict", str(path), "give model.toml of `diagnose`")

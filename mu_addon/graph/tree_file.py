@@ -21,7 +21,7 @@ from pathlib import Path
 from typing import Any
 
 from ..errors import InputError
-from ..reading import file_text, is_number, parse_toml, unreadable
+from ..reading import is_number, parse_toml, read_text
 from ..toml_writer import toml_text
 from .tree import Node, NodeTree, Source
 
@@ -56,12 +56,7 @@ def tree_text(tree: NodeTree, run: Mapping[str, Any] | None = None) -> str:
 
 def read_tree(path: str | Path) -> NodeTree:
     """The tree in a TOML file; raises InputError with the fault and its place."""
-    try:
-        text = file_text(path, MOST_BYTES)
-    except (OSError, UnicodeDecodeError) as error:
-        raise InputError(
-            f"cannot read the node tree: {unreadable(error)}", str(path), "give the TOML file of a node tree"
-        ) from error
+    text = read_text(path, "node tree", "give the TOML file of a node tree", MOST_BYTES)
     return parse_tree(text, str(path))
 
 

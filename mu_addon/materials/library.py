@@ -19,7 +19,7 @@ from ..design.wall_material import DEFAULT, Wall, require_used
 from ..errors import InputError, did_you_mean
 from ..fem import laws
 from ..files import write_text
-from ..reading import file_text
+from ..reading import read_text
 from ..toml_writer import toml_value
 from .coupon import MODES, Array
 from .law_forms import with_bulk
@@ -193,17 +193,8 @@ def load_material(name: str) -> Material:
 
 def read_material(path: str | Path) -> Material:
     """The material in a TOML file. Raises InputError with file, line and key."""
-    try:
-        text = file_text(path)
-    except OSError as error:
-        raise InputError(
-            f"cannot read the file: {error.strerror}",
-            str(path),
-            f"shipped materials: {', '.join(material_names())}",
-        ) from error
-    except UnicodeDecodeError as error:
-        raise InputError("the file is not UTF-8 text", str(path), "save it as UTF-8") from error
-    return parse_material(text, str(path))
+    remedy = f"shipped materials: {', '.join(material_names())}"
+    return parse_material(read_text(path, "file", remedy), str(path))
 
 
 def parse_material(text: str, origin: str = "") -> Material:

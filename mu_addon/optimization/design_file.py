@@ -17,7 +17,7 @@ from ..design.settings import ORIENTATION, USUAL_RESIN
 from ..errors import InputError
 from ..materials.library import Material, load_material, material_text, read_material
 from ..meshing.settings import MeshSettings
-from ..reading import parse_toml, text_of
+from ..reading import parse_toml, read_text
 from ..toml_writer import toml_text
 from . import settings as settings_of
 from .freedoms import PATH, Freedom, changed_unit, not_fixed, read_freedoms, with_fixed
@@ -188,7 +188,7 @@ def _elongation(material: Material) -> float:
 
 def read_design(path: Path, unit: Unit | None = None, body: Body | None = None) -> Design:
     """The design of a file, see `parse_design`; raises InputError with file, line and key."""
-    text = text_of(path, "design", "give the path of a design.toml", _LONGEST)
+    text = read_text(path, "design", "give the path of a design.toml", _LONGEST)
     return parse_design(text, str(path), unit, path.parent, body)
 
 

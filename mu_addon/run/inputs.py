@@ -12,7 +12,7 @@ from typing import Any, TypeVar, Union
 import attrs
 
 from ..errors import InputError, did_you_mean
-from ..reading import file_text, parse_toml
+from ..reading import parse_toml, read_text
 from .folder import RUN
 
 FORMAT = 1
@@ -28,14 +28,7 @@ def digest(content: str | bytes) -> str:
 
 def read_toml(path: Path, what: str = "inputs", remedy: str = "choose another folder") -> dict[str, Any]:
     """The document of a TOML file; raises InputError."""
-    where = str(path)
-    try:
-        text = file_text(path, _LONGEST)
-    except OSError as error:
-        raise InputError(f"cannot read the {what}: {error.strerror or error}", where, remedy) from error
-    except UnicodeDecodeError as error:
-        raise InputError("the file is not UTF-8 text", where, "save it as UTF-8") from error
-    return parse_toml(text, where)
+    return parse_toml(read_text(path, what, remedy, _LONGEST), str(path))
 
 
 def read_inputs(path: Path, *words: str) -> tuple[dict[str, Any], dict[str, Any]]:

@@ -14,7 +14,7 @@ from .. import design, evidence, materials, measured
 from ..design.quantity import described, in_kPa, in_MPa
 from ..design.settings import USUAL_RESIN
 from ..errors import InputError
-from ..reading import file_text, unreadable
+from ..reading import read_text
 from ..run.inputs import named_path, structured
 from ..run.study import Found, Input, Written, given
 
@@ -286,12 +286,8 @@ def path_of(unit: design.Unit, name: str, row: str = "") -> design.Window | Node
         )
     if not name.endswith(".csv"):
         return design.window(unit, name) if name else None
-    try:
-        rows = csv.DictReader(io.StringIO(file_text(name)))
-    except (OSError, UnicodeDecodeError) as error:
-        raise InputError(
-            f"cannot read the paths: {unreadable(error)}", name, "give paths.csv of `place --paths graph`"
-        ) from error
+    remedy = "give paths.csv of `place --paths graph`"
+    rows = csv.DictReader(io.StringIO(read_text(name, "paths", remedy)))
     named = next((r for r in rows if not row or r.get("path") == row), None)
     if named is None:
         raise InputError(

@@ -9,7 +9,7 @@ from typing import Any
 import attrs
 
 from ...errors import InputError
-from ...reading import file_text, unreadable
+from ...reading import read_text
 from ...toml_writer import Commented, toml_text
 from ..assets import asset_file, asset_names
 from ..settings import PRINTER
@@ -96,11 +96,7 @@ def load_printer(name: str = DEFAULT) -> Printer:
 def read_printer(path: str | Path) -> Printer:
     """The printer in a TOML file. Raises InputError with file, line or key, and remedy."""
     path = Path(path)
-    try:
-        text = file_text(path)
-    except (OSError, UnicodeDecodeError) as error:
-        why = unreadable(error)
-        raise InputError(f"cannot read the printer's limits: {why}", str(path), "check the name") from error
+    text = read_text(path, "printer's limits", "check the name")
     of_limit = ("value", "source", "assumed", "measured")
     keys = {"": ("format", "name", "title"), **dict.fromkeys(MEANING, of_limit)}
     document = parse(text, keys, str(path))

@@ -25,7 +25,7 @@ from ...evidence.simulator import Composite
 from ...files import write_csv
 from ...measured import Experiment
 from ...optimization.freedoms import Freedom, changed_unit, read_freedoms
-from ...reading import parse_toml, text_of
+from ...reading import parse_toml, read_text
 
 Array = np.ndarray[Any, Any]
 
@@ -150,7 +150,7 @@ def read_unknown(text: str, origin: str, unit: Unit) -> Unknown:
 
 def unknown_of(path: Path, unit: Unit) -> Unknown:
     """The unknown parameters of a file; raises InputError."""
-    text = text_of(path, "unknown parameters", "give a file of [[freedom]] tables")
+    text = read_text(path, "unknown parameters", "give a file of [[freedom]] tables")
     return read_unknown(text, str(path), unit)
 
 

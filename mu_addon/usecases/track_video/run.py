@@ -22,7 +22,7 @@ from ...measured.pose import AT_REST, SAMPLES
 from ...measured.table import Remark, read_table
 from ...measured.video import Motion, Pair, Tracks, View, motion, resting
 from ...measured.writing import add_experiment, csv_text, file_stem, tried
-from ...reading import file_text, is_finite, unreadable
+from ...reading import is_finite, read_text, unreadable
 from ...run.context import RunContext
 from ...table_cells.own_tables import own_text
 from ...toml_writer import toml_text
@@ -96,12 +96,7 @@ class Filmed:
 
 def read_bench(path: Path) -> Bench:
     """Read a TOML file that describes a video; raises InputError with line and remedy."""
-    try:
-        text = file_text(path)
-    except (OSError, UnicodeDecodeError) as error:
-        raise InputError(
-            f"cannot read the description of the video: {unreadable(error)}", str(path), "check path and file"
-        ) from error
+    text = read_text(path, "description of the video", "check path and file")
     document = parse(text, {"": HEAD, "experiment": OF_EXPERIMENT}, str(path))
 
     def at(key: str) -> str:
