@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import math
 import re
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
+from contextlib import contextmanager
 from typing import Any
 
 import attrs
@@ -19,22 +20,35 @@ _KEY = re.compile(r"\s*[\"']?([\w-]+)[\"']?\s*=")
 
 @attrs.frozen
 class Row:
-    """A table, where it stands, and the lines of its keys as far as they are known."""
+    """A table, where it stands, and the lines of its keys as far as they are known.
+
+    heading: what a key is written after in messages, as "[modulus] ".
+    """
 
     table: Mapping[str, Any]
     origin: str
     place: str = ""
     lines: Mapping[str, int] = attrs.field(factory=dict)
+    heading: str = ""
 
     @property
     def where(self) -> str:
         """File and line."""
-        return f"{self.origin}, {self.place}" if self.place else self.origin
+        return ", ".join(filter(None, (self.origin, self.place))) or "TOML text"
 
     def refusal(self, what: str, key: str, remedy: str) -> InputError:
         """The error of a key."""
-        line = f"{self.origin}, line {self.lines[key]}" if key in self.lines else self.where
-        return InputError(what, f"{line}, {key}", remedy)
+        line = attrs.evolve(self, place=f"line {self.lines[key]}") if key in self.lines else self
+        return InputError(what, f"{line.where}, {self.heading}{key}", remedy)
+
+    @contextmanager
+    def at(self, key: str = "") -> Iterator[None]:
+        """Context that gives an InputError the place of a key, without one of that which it names."""
+        try:
+            yield
+        except InputError as error:
+            named = key or error.where.rpartition(" ")[2]
+            raise self.refusal(error.what, named, error.remedy) from error
 
     def require_keys(self, known: Sequence[str], of: str = "") -> None:
         """Raise InputError for a key that is none of these."""
@@ -69,21 +83,20 @@ class Row:
             raise self.refusal(what, key, f"one of: {', '.join(known)}")
         return value
 
-    def word(self, key: str, default: str = "") -> str:
-        """A text; raises InputError."""
+    def word(self, key: str, default: str | None = None) -> str:
+        """A text, not an empty one but by default; raises InputError."""
         value = self.table.get(key, default)
-        if not isinstance(value, str):
-            raise self.refusal(f"{key} = {value!r} is not a text", key, "write it in quotes")
+        if not isinstance(value, str) or (value != default and not value.strip()):
+            what = f"{key} is missing" if value is None else f"{key} = {value!r} is not a text"
+            raise self.refusal(what, key, f'write {key} = "..."')
         return value
 
     def setting(self, described: Description, default: Any = None) -> Any:
         """Value of a setting, or its default; raises InputError."""
         key = described.name
         value = self.table.get(key, described.default if default is None else default)
-        try:
+        with self.at(key):
             return described.checked(value)
-        except InputError as error:
-            raise self.refusal(error.what, key, error.remedy) from error
 
 
 def rows_of(document: Mapping[str, Any], text: str, origin: str, key: str) -> list[Row]:
@@ -98,6 +111,12 @@ def rows_of(document: Mapping[str, Any], text: str, origin: str, key: str) -> li
     return [
         Row(table, origin, f"line {line}", keys) for table, (line, keys) in zip(found, written, strict=True)
     ]
+
+
+def row_of(document: Mapping[str, Any], text: str, origin: str, key: str) -> Row:
+    """The table [key] of a document."""
+    line, keys = next(((line, keys) for heading, line, keys in _headings(text) if heading == key), (0, {}))
+    return Row(document[key], origin, f"line {line}" if line else "", keys, f"[{key}] ")
 
 
 def top_of(document: Mapping[str, Any], text: str, origin: str) -> Row:

@@ -14,12 +14,13 @@ from ..design.assets import asset_file, asset_names
 from ..design.declared_laws import wall_laws, wall_parameters
 from ..design.parameters import HIGHEST_POISSON
 from ..design.quantity import in_kPa
-from ..design.toml_text import parse, place
+from ..design.rows import Row, row_of, rows_of, top_of
+from ..design.toml_text import parse
 from ..design.wall_material import DEFAULT, Wall, require_used
-from ..errors import InputError, did_you_mean
+from ..errors import InputError
 from ..fem import laws
 from ..files import write_text
-from ..reading import read_text
+from ..reading import is_number, read_text
 from ..toml_writer import toml_value
 from .coupon import MODES, Array
 from .law_forms import with_bulk
@@ -203,209 +204,123 @@ def parse_material(text: str, origin: str = "") -> Material:
     Raises InputError with `origin`, line and key.
     """
     document = parse(text, _KEYS, origin)
-    reader = _Reader(text, origin)
+    top = top_of(document, text, origin)
     if document.get("format") != FORMAT or document["format"] is True:
-        raise InputError(
-            f"format = {document.get('format')!r} is not known",
-            reader.at("", "format"),
-            f"write format = {FORMAT}",
-        )
-    values = {name: reader.value(name, document[name]) for name in QUANTITIES if name in document}
-    points = document.get("point", [])
-    if not isinstance(points, list):
-        raise InputError(
-            "point is not a list of tables", reader.at("", "point"), "write [[point]] above each"
-        )
+        what = f"format = {document.get('format')!r} is not known"
+        raise top.refusal(what, "format", f"write format = {FORMAT}")
+
+    def row(key: str) -> Row:
+        return row_of(document, text, origin, key)
+
+    values = {name: _value(name, row(name)) for name in QUANTITIES if name in document}
+    points = rows_of(document, text, origin, "point")
     if "law" not in document:
         raise InputError(
             "there is no [law]", origin or "TOML text", 'add [law] with its name, such as "neo-Hooke"'
         )
     return Material(
-        name=reader.word("", document, "name"),
-        about=reader.word("", document, "about") if "about" in document else "",
+        name=top.word("name"),
+        about=top.word("about", ""),
         values=values,
-        points=tuple(reader.point(i, point) for i, point in enumerate(points, 1)),
-        **reader.law(document["law"], values),
-        **(reader.wall(document["wall"]) if "wall" in document else {}),
+        points=tuple(_point(attrs.evolve(point, heading="[point] ")) for point in points),
+        **_law(row("law"), values),
+        **(_wall(row("wall")) if "wall" in document else {}),
     )
 
 
-@attrs.frozen
-class _Reader:
-    """Values of a document, each checked at its place."""
+def _value(name: str, row: Row) -> Value:
+    unit, table = row.table.get("unit"), row.table
+    if unit != QUANTITIES[name]:
+        raise row.refusal(f"{name} is in {unit!r}", "unit", f"give it in {QUANTITIES[name]!r}")
+    bounds = (-1.0, 0.5) if name == "poisson" else (0.0, 1e6)
+    value = row.number("value", *bounds)
+    span = {key: row.number(key, *bounds) for key in ("low", "high") if key in table}
+    if not span.get("low", value) <= value <= span.get("high", value):
+        what = f"{name} = {value:g} does not lie between its low and high"
+        raise row.refusal(what, "value", "correct one")
+    return Value(name, value, unit, row.one_of("confidence", CONFIDENCE), row.word("source"), **span)
 
-    text: str
-    origin: str
 
-    def at(self, table: str, key: str, number: int = 1) -> str:
-        """File, line and name of a key; of the n-th table of that name."""
-        line, count, inside = None, 0, table == ""
-        for i, words in enumerate(self.text.splitlines(), 1):
-            header = words.strip().strip("[]").strip() if words.lstrip().startswith("[") else None
-            if header is not None:
-                count += header == table
-                inside = header == table and count == number
-                line = i if inside and line is None else line
-            elif inside and words.split("=")[0].strip() == key:
-                line = i
-        return f"{place(self.origin, line)}, {f'[{table}] ' if table else ''}{key}".rstrip()
+def _point(row: Row) -> StressPoint:
+    row.require_keys(_POINT)
+    return StressPoint(
+        row.one_of("mode", MODES),
+        row.number("strain", -0.99, 20.0),
+        row.number("stress_MPa", -1e6, 1e6),
+        row.one_of("confidence", CONFIDENCE),
+        row.word("source"),
+    )
 
-    def word(self, table: str, found: Mapping[str, Any], key: str, number: int = 1) -> str:
-        value = found.get(key)
-        if not isinstance(value, str) or not value.strip():
-            what = f"{key} is missing" if value is None else f"{key} = {value!r} is not a text"
-            raise InputError(what, self.at(table, key, number), f'write {key} = "..."')
-        return value
 
-    def number(
-        self, table: str, found: Mapping[str, Any], key: str, low: float, high: float, number: int = 1
-    ) -> float:
-        value = found.get(key)
-        where = self.at(table, key, number)
-        if isinstance(value, bool) or not isinstance(value, int | float):
-            what = f"{key} is missing" if value is None else f"{key} = {value!r} is not a number"
-            raise InputError(what, where, f"give a number from {low:g} to {high:g}")
-        if not low <= value <= high:
-            raise InputError(
-                f"{key} = {value:g} is out of bounds", where, f"give a number from {low:g} to {high:g}"
-            )
-        return float(value)
-
-    def choice(
-        self, table: str, found: Mapping[str, Any], key: str, choices: Sequence[str], number: int = 1
-    ) -> str:
-        value = self.word(table, found, key, number)
-        if value not in choices:
-            raise InputError(
-                f"{key} = {value!r} is not known{did_you_mean(value, choices)}",
-                self.at(table, key, number),
-                f"choose one of {', '.join(choices)}",
-            )
-        return value
-
-    def value(self, name: str, found: Mapping[str, Any]) -> Value:
-        unit = found.get("unit")
-        if unit != QUANTITIES[name]:
-            raise InputError(
-                f"{name} is in {unit!r}", self.at(name, "unit"), f"give it in {QUANTITIES[name]!r}"
-            )
-        low, high = (-1.0, 0.5) if name == "poisson" else (0.0, 1e6)
-        value = self.number(name, found, "value", low, high)
-        span = {key: self.number(name, found, key, low, high) for key in ("low", "high") if key in found}
-        if not span.get("low", value) <= value <= span.get("high", value):
-            raise InputError(
-                f"{name} = {value:g} does not lie between its low and high",
-                self.at(name, "value"),
-                "correct one",
-            )
-        confidence = self.choice(name, found, "confidence", CONFIDENCE)
-        return Value(name, value, unit, confidence, self.word(name, found, "source"), **span)
-
-    def point(self, number: int, found: Mapping[str, Any]) -> StressPoint:
-        for key in found:
-            if key not in _POINT:
-                raise InputError(
-                    f"unknown key {key!r}{did_you_mean(key, _POINT)}",
-                    self.at("point", key, number),
-                    f"known here: {', '.join(_POINT)}",
-                )
-        return StressPoint(
-            self.choice("point", found, "mode", MODES, number),
-            self.number("point", found, "strain", -0.99, 20.0, number),
-            self.number("point", found, "stress_MPa", -1e6, 1e6, number),
-            self.choice("point", found, "confidence", CONFIDENCE, number),
-            self.word("point", found, "source", number),
+def _law(row: Row, values: Mapping[str, Value]) -> dict[str, Any]:
+    found, law = row.table, LAWS[row.one_of("name", tuple(LAWS))]
+    if "parameters" in found:
+        parameters = _numbers(row, "parameters", law.parameter_names)
+        for name in law.parameter_names:
+            if name not in parameters:
+                raise row.refusal(f"{name} is missing", "parameters", "give every parameter of the law")
+        numbers = np.array([parameters[name] for name in law.parameter_names])
+    elif law is laws.NeoHooke and {"modulus", "poisson"} <= set(values):
+        numbers = law.parameters(values["modulus"].value, values["poisson"].value)[0]
+    else:
+        raise row.refusal(
+            f"the {law.name} law has no parameters",
+            "parameters",
+            f"give parameters = {{ {', '.join(f'{name} = ...' for name in law.parameter_names)} }}"
+            + (", or [modulus] and [poisson]" if law is laws.NeoHooke else ""),
         )
+    with row.at("parameters"):
+        law.valid(numbers[None])
+    fails = found.get("fails", [])
+    if not isinstance(fails, list) or not all(mode in MODES for mode in fails):
+        remedy = f"choose from {', '.join(MODES)}"
+        raise row.refusal(f"fails = {fails!r} is not a list of modes", "fails", remedy)
+    return {
+        "law": law,
+        "parameters": numbers,
+        "law_confidence": row.one_of("confidence", CONFIDENCE),
+        "law_source": row.word("source"),
+        "ranges": _ranges(row),
+        "fails": tuple(fails),
+        "low95": _numbers(row, "low95", law.parameter_names),
+        "high95": _numbers(row, "high95", law.parameter_names),
+    }
 
-    def law(self, found: Mapping[str, Any], values: Mapping[str, Value]) -> dict[str, Any]:
-        law = LAWS[self.choice("law", found, "name", tuple(LAWS))]
-        if "parameters" in found:
-            row = self._row(law, found["parameters"])
-        elif law is laws.NeoHooke and {"modulus", "poisson"} <= set(values):
-            row = law.parameters(values["modulus"].value, values["poisson"].value)[0]
-        else:
-            raise InputError(
-                f"the {law.name} law has no parameters",
-                self.at("law", "parameters"),
-                f"give parameters = {{ {', '.join(f'{name} = ...' for name in law.parameter_names)} }}"
-                + (", or [modulus] and [poisson]" if law is laws.NeoHooke else ""),
-            )
-        try:
-            law.valid(row[None])
-        except InputError as error:
-            raise InputError(error.what, self.at("law", "parameters"), error.remedy) from error
-        return {
-            "law": law,
-            "parameters": row,
-            "law_confidence": self.choice("law", found, "confidence", CONFIDENCE),
-            "law_source": self.word("law", found, "source"),
-            "ranges": self._ranges(found),
-            "fails": self._modes(found, "fails") if "fails" in found else (),
-            "low95": self._interval(law, found, "low95"),
-            "high95": self._interval(law, found, "high95"),
-        }
 
-    def wall(self, found: Mapping[str, Any]) -> dict[str, Any]:
-        given = {name: value for name, value in found.items() if name in _WALL}
-        try:
-            wall = Wall(**given)
-            require_used(wall, given)
-        except InputError as error:
-            key = error.where.rpartition(" ")[2]
-            raise InputError(error.what, self.at("wall", key), error.remedy) from error
-        return {
-            "wall": wall,
-            "wall_confidence": self.choice("wall", found, "confidence", CONFIDENCE),
-            "wall_source": self.word("wall", found, "source"),
-        }
+def _wall(row: Row) -> dict[str, Any]:
+    given = {name: value for name, value in row.table.items() if name in _WALL}
+    with row.at():
+        wall = Wall(**given)
+        require_used(wall, given)
+    return {
+        "wall": wall,
+        "wall_confidence": row.one_of("confidence", CONFIDENCE),
+        "wall_source": row.word("source"),
+    }
 
-    def _row(self, law: Any, found: Any) -> Array:
-        where = self.at("law", "parameters")
-        if not isinstance(found, dict):
-            raise InputError("parameters is not a table", where, "write { name = value, ... }")
-        for key in found:
-            if key not in law.parameter_names:
-                raise InputError(
-                    f"the {law.name} law has no parameter {key!r}{did_you_mean(key, law.parameter_names)}",
-                    where,
-                    f"its parameters are {', '.join(law.parameter_names)}",
-                )
-        return np.array([self.number("law", found, name, -1e9, 1e9) for name in law.parameter_names])
 
-    def _ranges(self, found: Mapping[str, Any]) -> dict[str, tuple[float, float]]:
-        ranges, where = found.get("ranges"), self.at("law", "ranges")
-        remedy = "give the stretches it is valid for, such as { uniaxial = [0.7, 1.5] }"
-        if not isinstance(ranges, dict) or not ranges or not set(ranges) <= set(MODES):
-            raise InputError(f"ranges = {ranges!r} does not name modes", where, remedy)
-        for mode, span in ranges.items():
-            pair = isinstance(span, list) and len(span) == 2
-            if not pair or not all(isinstance(x, int | float) and not isinstance(x, bool) for x in span):
-                raise InputError(f"the range of {mode}, {span!r}, is not two stretches", where, remedy)
-            if not 0 < span[0] <= 1 <= span[1] or span[0] == span[1]:
-                raise InputError(
-                    f"the range of {mode}, {span!r}, does not go from above 0 up to 1 and from 1 on",
-                    where,
-                    remedy,
-                )
-        return {mode: (float(low), float(high)) for mode, (low, high) in ranges.items()}
+def _numbers(row: Row, key: str, names: Sequence[str]) -> dict[str, float]:
+    """Numbers by the law's parameter, of a table within a line."""
+    found = row.table.get(key, {})
+    if not isinstance(found, dict):
+        raise row.refusal(f"{key} is not a table", key, "write { name = value, ... }")
+    inner = attrs.evolve(row, table=found, lines={name: row.lines[key] for name in found if key in row.lines})
+    inner.require_keys(names)
+    return {name: inner.number(name, -1e30, 1e30) for name in found}
 
-    def _modes(self, found: Mapping[str, Any], key: str) -> tuple[str, ...]:
-        modes = found[key]
-        if not isinstance(modes, list) or not all(mode in MODES for mode in modes):
-            raise InputError(
-                f"{key} = {modes!r} is not a list of modes",
-                self.at("law", key),
-                f"choose from {', '.join(MODES)}",
-            )
-        return tuple(modes)
 
-    def _interval(self, law: Any, found: Mapping[str, Any], key: str) -> dict[str, float]:
-        table = found.get(key, {})
-        if not isinstance(table, dict) or not set(table) <= set(law.parameter_names):
-            raise InputError(
-                f"{key} names no parameters of the law", self.at("law", key), "write { name = value }"
-            )
-        return {name: self.number("law", table, name, -1e30, 1e30) for name in table}
+def _ranges(row: Row) -> dict[str, tuple[float, float]]:
+    ranges = row.table.get("ranges")
+    remedy = "give the stretches it is valid for, such as { uniaxial = [0.7, 1.5] }"
+    if not isinstance(ranges, dict) or not ranges or not set(ranges) <= set(MODES):
+        raise row.refusal(f"ranges = {ranges!r} does not name modes", "ranges", remedy)
+    for mode, span in ranges.items():
+        if not isinstance(span, list) or len(span) != 2 or not all(map(is_number, span)):
+            raise row.refusal(f"the range of {mode}, {span!r}, is not two stretches", "ranges", remedy)
+        if not 0 < span[0] <= 1 <= span[1] or span[0] == span[1]:
+            what = f"the range of {mode}, {span!r}, does not go from above 0 up to 1 and from 1 on"
+            raise row.refusal(what, "ranges", remedy)
+    return {mode: (float(low), float(high)) for mode, (low, high) in ranges.items()}
 
 
 def write_material(material: Material, path: Path, head: str = "") -> None:

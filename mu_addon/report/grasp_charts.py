@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from typing import Any
 
 import numpy as np
@@ -11,7 +11,7 @@ from ..design.gripper import ROOT, Gripper, GripperSolid
 from ..grasp import Grasp
 from ..meshing.mesh import Mesh
 from . import plots
-from .render import Camera, Cut, Part, fit, png, render
+from .render import Cut, Part, framed, png, render
 from .results import Picture
 from .unit_pictures import COLORS, WHITE, skins_of, unit_parts
 
@@ -46,17 +46,10 @@ def part_picture(gripper: Gripper, solid: GripperSolid, width: int = 1000) -> Pi
     parts = [Part(vertices, part.faces, part.color) for part in fingers]
     parts.append(Part(vertices, triangles[plate], PLATE_COLOR))
     cut = Cut((0.0, 0.0, 0.0), (1.0, 0.0, 0.0), color=(0.95, 0.86, 0.72))
-    camera, aspect = _framed(parts, (1.0, 0.28, -0.35))
+    camera, aspect = framed(parts, (1.0, 0.28, -0.35), HANGING, margin=0.02)
     image = render(parts, camera, width, round(width / aspect), cut=cut, background=WHITE)
     caption = "The printable part cut open, as it hangs: two units on their plate, tips down."
     return Picture(png(image), caption, "Two units hanging from a base plate, their lattice sides inward")
-
-
-def _framed(parts: Sequence[Part], towards: tuple[float, float, float]) -> tuple[Camera, float]:
-    axes = Camera((0, 0, 0), towards, HANGING, 1.0).axes
-    extent = np.ptp(np.vstack([np.asarray(part.vertices) for part in parts]) @ axes.T, axis=0)
-    aspect = float(extent[0] / extent[1])
-    return fit(parts, towards, HANGING, aspect, margin=0.02), aspect
 
 
 def frames(gripper: Gripper, mesh: Mesh, found: Grasp, width: int = 420) -> list[Picture]:
@@ -82,7 +75,9 @@ def frames(gripper: Gripper, mesh: Mesh, found: Grasp, width: int = 420) -> list
         middle = found.cube_mm[number] + gripper.placements[0][1]
         parts.append(Part(*box(middle - half, middle + half), CUBE_COLOR))
         scenes.append(parts)
-    camera, aspect = _framed([part for scene in scenes for part in scene], (1.0, 0.16, -0.12))
+    camera, aspect = framed(
+        [part for scene in scenes for part in scene], (1.0, 0.16, -0.12), HANGING, margin=0.02
+    )
     pictures = []
     for scene, (number, words) in zip(scenes, moments.values(), strict=True):
         image = render(scene, camera, width, round(width / aspect), background=WHITE)

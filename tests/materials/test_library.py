@@ -124,13 +124,13 @@ def test_an_unstable_law_is_named_before_it_is_used():
             'name = "neo-Hooke"',
             'name = "neo-Hooke"\nparameters = { mu_MPA = 1.0 }',
             "did you mean 'mu_MPa'",
-            "[law] parameters",
+            "[law] mu_MPA",
         ),
         (
             'name = "neo-Hooke"',
             'name = "neo-Hooke"\nparameters = { mu_MPa = 1.0 }',
             "kappa_MPa is missing",
-            "[law] kappa_MPa",
+            "[law] parameters",
         ),
     ],
 )
