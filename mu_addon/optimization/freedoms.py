@@ -4,16 +4,17 @@ from __future__ import annotations
 
 import math
 import re
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from typing import Any
 
 import attrs
 
-from ..design import grading, wall_factors
-from ..design.grading import CellFactor
+from ..design.factor_list import LEAST, MOST, FactorList, Place, place_text
+from ..design.grading import CELLS
 from ..design.parameters import SECTIONS, Unit
 from ..design.quantity import Description, describe
 from ..design.rows import Row
+from ..design.wall_factors import WALLS
 from ..errors import InputError, did_you_mean
 from ..meshing.settings import OF_CONTINUUM, require_printed
 from ..reading import is_number
@@ -23,73 +24,22 @@ PATH, RESIN = "path", "resin"
 """Freedoms besides a unit's parameters: the path of the sensor, and the resin of the unit."""
 
 
-@attrs.frozen
-class FactorList:
-    """A parameter that is a text of factors by place; each factor may be free: "grading.cells[0 2 *]".
+FACTOR_LISTS = {
+    "grading.cells": (CELLS, "cells", "column, row and chamber", "0 2 *"),
+    "chambers.wall_factors": (WALLS, "chamber", "chamber, counted from 1 at the inlet", "2"),
+}
+"""Parameters that are texts of factors by place, of which each may be free: "grading.cells[0 2 *]".
 
-    key: of a [[freedom]] table, names the place; place: its notation, with an example. factors: from a text,
-    by the text of their place; text: the inverse; both raise InputError.
-    """
-
-    name: str
-    key: str
-    place: tuple[str, str]
-    low: float
-    high: float
-    factors: Callable[[str], dict[str, float]]
-    text: Callable[[Mapping[str, float]], str]
-
-    def canonical(self, place: str) -> str:
-        """Canonical text of all that name the same place; raises InputError."""
-        # Any factor but 1, which would be no entry.
-        [found] = self.factors(f"{place}: 1.5")
-        return found
-
-    def of(self, unit: Unit) -> dict[str, float]:
-        """Factors of the unit by their place."""
-        section, _, name = self.name.partition(".")
-        return self.factors(getattr(getattr(unit, section), name))
+With the key of a [[freedom]] table that names the place, its notation, and an example."""
 
 
-def _cells_by_place(text: str) -> dict[str, float]:
-    entries = grading.parsed(text)
-    return {grading.cells_text([e._replace(factor=1.5)]).rpartition(":")[0]: e.factor for e in entries}
-
-
-def _text_of_cells(factors: Mapping[str, float]) -> str:
-    [*entries] = (
-        CellFactor(*grading.parsed(f"{place}: 1.5")[0][:3], factor) for place, factor in factors.items()
-    )
-    return grading.cells_text(entries)
-
-
-FACTOR_LISTS = (
-    FactorList(
-        "grading.cells",
-        "cells",
-        ("column, row and chamber", "0 2 *"),
-        grading.LEAST,
-        grading.MOST,
-        _cells_by_place,
-        _text_of_cells,
-    ),
-    FactorList(
-        "chambers.wall_factors",
-        "chamber",
-        ("chamber, counted from 1 at the inlet", "2"),
-        wall_factors.LEAST,
-        wall_factors.MOST,
-        lambda text: {str(chamber): factor for chamber, factor in wall_factors.parsed(text).items()},
-        lambda factors: wall_factors.text_of({int(chamber): f for chamber, f in factors.items()}),
-    ),
-)
-
-
-def _entry(name: str) -> tuple[FactorList, str] | None:
-    """List and place of a name such as "grading.cells[0 2 *]"; None for another name."""
+def _entry(name: str) -> tuple[str, FactorList, Place] | None:
+    """Parameter, list and place of a name such as "grading.cells[0 2 *]"; None for another name."""
     match = re.fullmatch(r"([^\[]+)\[(.+)\]", name)
-    lists = [known for known in FACTOR_LISTS if match is not None and match[1] == known.name]
-    return (lists[0], match[2]) if match is not None and lists else None
+    if match is None or match[1] not in FACTOR_LISTS:
+        return None
+    factors = FACTOR_LISTS[match[1]][0]
+    return match[1], factors, factors.place(match[2])
 
 
 @attrs.frozen
@@ -145,8 +95,8 @@ def parameters() -> dict[str, Description]:
 def parameter_of(unit: Unit, name: str) -> Any:
     """Value of a unit's parameter by its dotted name."""
     if entry := _entry(name):
-        listed, place = entry
-        return listed.of(unit).get(listed.canonical(place), 1.0)
+        listed, factors, place = entry
+        return factors.parsed(parameter_of(unit, listed)).get(place, 1.0)
     found: Any = unit
     for part in name.split("."):
         found = getattr(found, part)
@@ -160,23 +110,22 @@ def changed_unit(unit: Unit, freedoms: Sequence[Freedom], values: Sequence[Any])
     """
     sections: dict[str, dict[str, Any]] = {}
     head: dict[str, Any] = {}
-    entries: dict[str, dict[str, float]] = {}
+    entries: dict[str, dict[Place, float]] = {}
     for freedom, value in zip(freedoms, values, strict=True):
         for name, factor in ((freedom.name, None), *freedom.also.items()):
             own = value if factor is None else factor * value
             if entry := _entry(name):
-                listed, place = entry
-                entries.setdefault(listed.name, {})[listed.canonical(place)] = float(own)
+                entries.setdefault(entry[0], {})[entry[2]] = float(own)
                 continue
             section, _, key = name.rpartition(".")
             if section:
                 sections.setdefault(section, {})[key] = own
             else:
                 head[key] = own
-    for listed in FACTOR_LISTS:
-        if listed.name in entries:
-            section, _, key = listed.name.partition(".")
-            sections.setdefault(section, {})[key] = listed.text(listed.of(unit) | entries[listed.name])
+    for listed, own in entries.items():
+        factors, (section, _, key) = FACTOR_LISTS[listed][0], listed.partition(".")
+        text = factors.text(factors.parsed(parameter_of(unit, listed)) | own)
+        sections.setdefault(section, {})[key] = text
     changed = {section: attrs.evolve(getattr(unit, section), **own) for section, own in sections.items()}
     return attrs.evolve(unit, **head, **changed)
 
@@ -241,9 +190,8 @@ def _freedom(row: Row) -> Freedom:
         row.require_keys(("parameter", "values"))
         return Freedom(table["parameter"], values=_values(row, str))
     d = _parameter(row)
-    for listed in FACTOR_LISTS:
-        if d.name == listed.name and listed.key in table:
-            return _of_factor(listed, row)
+    if d.name in FACTOR_LISTS and FACTOR_LISTS[d.name][1] in table:
+        return _of_factor(d.name, row)
     row.require_keys(("parameter", "low", "high", "values", "also"))
     also = _also(row)
     if "values" in table:
@@ -277,20 +225,19 @@ def _range(row: Row, least: float, most: float, of: str, unit: str = "") -> tupl
     return low, high
 
 
-def _of_factor(listed: FactorList, row: Row) -> Freedom:
+def _of_factor(name: str, row: Row) -> Freedom:
     """The factor at the place that a table names; raises InputError."""
-    row.require_keys(("parameter", listed.key, "low", "high"))
-    given = row.table[listed.key]
-    what, example = listed.place
-    place = str(given) if type(given) in (str, int) else "?"
+    factors, key, what, example = FACTOR_LISTS[name]
+    row.require_keys(("parameter", key, "low", "high"))
+    given = row.table[key]
     try:
-        place = listed.canonical(place if ";" not in place else "?")
+        place = place_text(factors.place(str(given) if type(given) in (str, int) else "?"))
     except InputError as error:
         raise row.refusal(
-            f"{listed.key} = {given!r} does not give {what}", listed.key, f'write {listed.key} = "{example}"'
+            f"{key} = {given!r} does not give {what}", key, f'write {key} = "{example}"'
         ) from error
-    low, high = _range(row, listed.low, listed.high, f"{listed.key} {place} are not a range of factors")
-    return Freedom(f"{listed.name}[{place}]", low, high)
+    low, high = _range(row, LEAST, MOST, f"{key} {place} are not a range of factors")
+    return Freedom(f"{name}[{place}]", low, high)
 
 
 def _also(row: Row) -> dict[str, float]:
@@ -312,7 +259,7 @@ def _require_start(freedom: Freedom, unit: Unit, row: Row) -> None:
         try:
             changed_unit(unit, [freedom], [freedom.low])
         except InputError as error:
-            raise row.refusal(error.what, entry[0].key, error.remedy) from error
+            raise row.refusal(error.what, FACTOR_LISTS[entry[0]][1], error.remedy) from error
         return
     d = parameters()[freedom.name]
     for value in freedom.values:
