@@ -14,7 +14,7 @@ from ..design.settings import PRESET, PRINTER, USUAL_RESIN
 from ..errors import OutputError
 from ..files import json_text
 from ..run.inputs import digest
-from ..run.parts import File, Part, Sentence, Table, recorded
+from ..run.parts import File, Part, Sentence, Table, recorded, said
 from ..run.study import Members, Over, Study, derived, given, section, stage
 from .inputs import MaterialInput, PrinterInput, UnitInput, asked
 
@@ -144,7 +144,7 @@ class Specimens(Study):
             one = parts[name]
             mass = made.volume_mm3 / 1e3 * material.density_g_per_ml
             yield File(f"{name}.stl", made.written)
-            yield Sentence(f"{name}.stl: {mass:.2f} g, {one.measure}", terminal=True, page=False)
+            yield from said(f"{name}.stl: {mass:.2f} g, {one.measure}")
             rows.append(
                 {
                     "name": name,
@@ -185,10 +185,8 @@ class Specimens(Study):
                 for row in rows
             ],
         )
-        yield Sentence(
-            f"report.html lists the measurements; {TEMPLATE}/ holds the templates that `diagnose` reads",
-            terminal=True,
-            page=False,
+        yield from said(
+            f"report.html lists the measurements; {TEMPLATE}/ holds the templates that `diagnose` reads"
         )
 
     @section("gauge", "Gauge: caliper measurements")
