@@ -19,7 +19,6 @@ from ..design.toml_text import parse
 from ..design.wall_material import DEFAULT, Wall, require_used
 from ..errors import InputError
 from ..fem import laws
-from ..files import write_text
 from ..reading import is_number, read_text
 from ..toml_writer import toml_value
 from .coupon import MODES, Array
@@ -321,14 +320,6 @@ def _ranges(row: Row) -> dict[str, tuple[float, float]]:
             what = f"the range of {mode}, {span!r}, does not go from above 0 up to 1 and from 1 on"
             raise row.refusal(what, "ranges", remedy)
     return {mode: (float(low), float(high)) for mode, (low, high) in ranges.items()}
-
-
-def write_material(material: Material, path: Path, head: str = "") -> None:
-    """Write a material as TOML that `read_material` reads, below the lines of `head` as comments.
-
-    Raises OutputError.
-    """
-    write_text(path, material_text(material, head))
 
 
 def material_text(material: Material, head: str = "") -> str:

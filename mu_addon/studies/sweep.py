@@ -13,7 +13,7 @@ import attrs
 from .. import design
 from ..design.quantity import described
 from ..reading import parse_json
-from ..run.parts import Beside, Chart, Fact, Part, Sentence, Table, csv, recorded, said
+from ..run.parts import Beside, Chart, Fact, Part, Sentence, Table, csv, echo, recorded
 from ..run.study import Dropped, Found, Input, Over, Study, Written, given, section, stage
 from ..usecases import parameter_study
 from ..usecases.parameter_study.settings import ADD, WORKERS
@@ -191,7 +191,7 @@ class Sweep(Study):
         yield recorded("failures", failures)
         words = f"{len(done)} of {len(rows)} points done, {len(failed)} failed"
         words += "" if mean is None else f"; {mean:.1f} s and up to {most} MB each"
-        yield from said(words, *(f"failed: {what}" for what in failures[:5]))
+        yield from echo(words, *(f"failed: {what}" for what in failures[:5]))
         if failed:
             words = f"{len(failed)} of {len(rows)} points failed: they are rows of points.csv, too."
             yield Sentence(words, note=True)
