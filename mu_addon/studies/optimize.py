@@ -25,7 +25,7 @@ from ..run.study import (
     section,
     stage,
 )
-from .inputs import MODEL, FileInput, ModelInput, OnceInput, SchedulerInput
+from .inputs import MODEL, FileInput, ModelInput, SchedulerInput, once
 
 FRONT = "front.png"
 SEARCH, CHECK = "search", "check of what is proposed"
@@ -94,9 +94,7 @@ class Optimize(Study):
 
     design: optimization.Design = given(DesignInput())
     model: evidence.ExtendedModel | None = given(ModelInput(), default=None)
-    workers: int = given(
-        OnceInput(descriptions=(WORKERS,), metavar="N"), default=WORKERS.default, converter=WORKERS.checked
-    )
+    workers: int = once(WORKERS, metavar="N")
     scheduler: str = given(SchedulerInput(), default="")
 
     @property
