@@ -52,7 +52,7 @@ class Sentence:
     found: bool = False
 
 
-def said(*lines: str) -> list[Sentence]:
+def echo(*lines: str) -> list[Sentence]:
     """Lines at the end of a command, which the report leaves out."""
     return [Sentence(line, terminal=True, page=False) for line in lines]
 

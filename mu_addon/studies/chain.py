@@ -14,7 +14,7 @@ from ..chain.settings import GRAVITY, ORIENTATION, REFINE, TIMES, TIP_MASS
 from ..design.quantity import described
 from ..design.settings import USUAL_RESIN
 from ..errors import InputError
-from ..run.parts import Beside, Chart, Fact, File, Part, Pictures, Sentence, Table, Warn, csv, recorded, said
+from ..run.parts import Beside, Chart, Fact, File, Part, Pictures, Sentence, Table, Warn, csv, echo, recorded
 from ..run.study import (
     Found,
     Input,
@@ -364,7 +364,7 @@ class Chain(Study):
             f"{one.error_mm:.2f} mm": None
             for one in shape.learned
         }
-        yield from said(*lines)
+        yield from echo(*lines)
         last, largest = motion.states[-1], max(state.angle_deg for state in motion.states)
         mass = sum(found.joint.mass_g for found in shape.learned)
         x, y, z = last.tip_mm
@@ -426,7 +426,7 @@ class Chain(Study):
         ]  # fmt: skip
         yield csv("tip.csv", [*columns, "used_range"], [[f"{v:.9g}" for v in row] for row in rows])
         *rest, last = (", ".join(f"{v:.1f}" for v in s.tip_mm) for s in (motion.rest, motion.states[-1]))
-        yield from said(
+        yield from echo(
             f"tip of {len(units)} units at ({last}) mm, {motion.states[-1].angle_deg:.1f} deg; at rest "
             f"({rest[0]}) mm"
         )
@@ -478,7 +478,7 @@ class Chain(Study):
             "its bound cannot change further."
         )
         shown = ", ".join(f"{p:.4g}" for p in found.pressures_kPa)
-        yield from said(f"target missed by {found.miss_mm:.3g} mm, at {shown} kPa")
+        yield from echo(f"target missed by {found.miss_mm:.3g} mm, at {shown} kPa")
         yield Table(
             "",
             [("unit", ""), ("kPa", "n"), ("at its bound", "")],

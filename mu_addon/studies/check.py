@@ -26,8 +26,8 @@ from ..run.parts import (
     Sentence,
     Table,
     Warn,
+    echo,
     recorded,
-    said,
 )
 from ..run.study import Found, Input, Node, Study, Tell, Written, given, intermediate, section, setting, stage
 from .inputs import NumbersInput, OnceInput, PrinterInput, UnitInput, WindowInput, asked
@@ -407,7 +407,7 @@ class Check(Study):
                 f"best build direction ({towards}): {best.islands} islands, {best.support_mm2:.0f} mm2 to "
                 f"support, of it {best.inner_mm2:.0f} mm2 in chambers, cups of {best.cup_ml:.2g} ml"
             )
-        yield from said(*lines)
+        yield from echo(*lines)
 
     @section("repair", "Repair")
     def repaired(self, part: Surface) -> Iterator[Part]:

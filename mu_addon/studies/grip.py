@@ -14,7 +14,7 @@ from ..design.settings import FRICTION, QUALITY
 from ..errors import InputError, OutputError
 from ..grasp.settings import BEYOND, DENSITY, STEP_S
 from ..meshing.settings import REFINE, SELF_CONTACT
-from ..run.parts import Beside, Chart, Fact, File, Part, Pictures, Sentence, Table, Warn, csv, recorded, said
+from ..run.parts import Beside, Chart, Fact, File, Part, Pictures, Sentence, Table, Warn, csv, echo, recorded
 from ..run.study import (
     Found,
     Input,
@@ -333,7 +333,7 @@ class Grip(Study):
         if grasps:
             yield recorded("grasps", {f"{s:g}": figures_of(g) for s, g in grasps.items()})
         size = f"{x:g} x {y:g} x {z:.4g} mm"
-        yield from said(f"one part of {size}, {part.gates.inner_shells} chambers")
+        yield from echo(f"one part of {size}, {part.gates.inner_shells} chambers")
         yield File("gripper.stl", lambda path: design.stl_bytes(part.vertices, part.triangles))
         yield File("gripper.3mf", lambda path: _threemf(gripper.name, part))
         shown = [Fact("part", size, size), Fact("resin", 0, f"{part.gates.volume_mm3 / 1e3:.3g} ml")]
@@ -342,7 +342,7 @@ class Grip(Study):
             angle, force, lift = g.angle_deg[g.end("iii")], g.normal_N[g.end("iii")], g.lift
             shown.append(Fact(f"{side:g} mm, plateau", angle, f"{angle:.1f}°, {force:.2f} N"))
             hung = f"held, {lift.margin:.3g} times its weight" if lift.held else "not lifted"
-            yield from said(
+            yield from echo(
                 f"cube of {side:g} mm: {angle:.1f} deg and {force:.3g} N a finger at the plateau, {hung}"
             )
             words.append(

@@ -11,7 +11,7 @@ from .. import design, fem, homogenize, meshing
 from ..design.quantity import described
 from ..errors import InputError
 from ..meshing.settings import REFINE
-from ..run.parts import Beside, Chart, Fact, File, Part, Pictures, Sentence, Table, Warn, csv, recorded, said
+from ..run.parts import Beside, Chart, Fact, File, Part, Pictures, Sentence, Table, Warn, csv, echo, recorded
 from ..run.study import (
     Dropped,
     Members,
@@ -349,7 +349,7 @@ class Homogenize(Study):
             answer=True,
             strong=kPa(1e3 * e.E100),
         )
-        yield from said(
+        yield from echo(
             f"Young's modulus {1e3 * e.E100:.4g} kPa along an axis of the cell, {1e3 * e.E111:.4g} kPa along "
             f"a strut; relative density {e.relative_density:.4f}"
         )
@@ -459,7 +459,7 @@ class Homogenize(Study):
             yield recorded(f"specimen.{friction}.valid_to_strain", found.valid_to_strain)
             yield recorded(f"specimen.{friction}.why", found.why)
             shown = ", ".join(f"{name} {1e3 * value:.4g} kPa" for name, value in values.items())
-            yield from said(f"block between plates ({friction}): {shown}")
+            yield from echo(f"block between plates ({friction}): {shown}")
             for procedure, value in values.items():
                 needs = {"slope 0-40 %": 0.4, "secant at 40 %": 0.4, homogenize.DEFAULT: 0.1}.get(
                     procedure, 0.0

@@ -11,7 +11,7 @@ from typing import Any
 import attrs
 
 from .. import design, evidence, materials, measured
-from ..design.quantity import described, in_kPa, in_MPa
+from ..design.quantity import Description, described, in_kPa, in_MPa
 from ..design.settings import USUAL_RESIN
 from ..errors import InputError
 from ..reading import text_in
@@ -26,6 +26,12 @@ _LONGEST_PATH = 1 << 18
 def asked(of: type[Input], name: str, text: str, default: str = "", *, empty: Any = None, **more: Any) -> Any:
     """attrs field of an input that is made of one text; empty: its value without it; more: of the input."""
     return given(of(descriptions=(described(name, default, text),), **more), default=empty)
+
+
+def once(described: Description, **more: Any) -> Any:
+    """attrs field of a setting that no run keeps; more: of its input."""
+    made = OnceInput(descriptions=(described,), **more)
+    return given(made, default=described.default, converter=described.checked)
 
 
 @attrs.frozen

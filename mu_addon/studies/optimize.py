@@ -15,7 +15,7 @@ from .. import evidence, optimization
 from ..design.quantity import described
 from ..errors import InputError
 from ..optimization.settings import BODY, DESIGN, RESIN, UNIT, WORKERS
-from ..run.parts import Beside, Chart, Fact, File, Part, Sentence, Table, Warn, csv, recorded, said
+from ..run.parts import Beside, Chart, Fact, File, Part, Sentence, Table, Warn, csv, echo, recorded
 from ..run.study import (
     Dropped,
     Over,
@@ -26,7 +26,7 @@ from ..run.study import (
     section,
     stage,
 )
-from .inputs import MODEL, FileInput, ModelInput, OnceInput, SchedulerInput
+from .inputs import MODEL, FileInput, ModelInput, SchedulerInput, once
 
 FRONT = "front.png"
 SEARCH, CHECK = "search", "check of what is proposed"
@@ -105,9 +105,7 @@ class Optimize(Study):
 
     design: optimization.Design = given(DesignInput())
     model: evidence.ExtendedModel | None = given(ModelInput(), default=None)
-    workers: int = given(
-        OnceInput(descriptions=(WORKERS,), metavar="N"), default=WORKERS.default, converter=WORKERS.checked
-    )
+    workers: int = once(WORKERS, metavar="N")
     scheduler: str = given(SchedulerInput(), default="")
 
     @property
@@ -221,14 +219,14 @@ class Optimize(Study):
         yield recorded("front", len(found.proposed))
         names, rows = [t.name for t in design.targets], []
         solved = sum(one.model_a for (*_, slopes), one in units.items() if slopes)
-        yield from said(f"{len(found.observed)} units computed, {solved} Model A's")
+        yield from echo(f"{len(found.observed)} units computed, {solved} Model A's")
         for place, c in verified.items():
             o = found.observed[found.some(MOST_CHECKED)[place - 1]]
             values = dict(zip(names, map(float, c.values), strict=True))
             shown = ", ".join(f"{n} {v:.4g}" for n, v in values.items() if not isnan(v))
             printable, robust = c.print_worst or "not asked", "robust" if c.is_robust else "not robust"
             line = f"proposed-{place}.toml: {robust}; print check: {printable}; {shown}"
-            yield from said(line)
+            yield from echo(line)
             rows.append(
                 {
                     "file": f"proposed-{place}.toml",
