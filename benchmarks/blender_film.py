@@ -115,7 +115,7 @@ def simulate():
     stage = ""
     while jobs.running():
         # Of the session before, which was cut off.
-        (child,) = (jobs.child_of(key) for key in jobs.running())
+        (child,) = (job.child for job in jobs.running())
         yield 2.0
         if child.progress.get("stage") != stage:
             stage = child.progress.get("stage")

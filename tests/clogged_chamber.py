@@ -13,8 +13,8 @@ from mu_addon.evidence import unit_fem
 from mu_addon.measured import read_folder
 from mu_addon.run.context import run_to_end
 from mu_addon.run.progress import Progress
-from mu_addon.usecases.diagnose.job import Job
-from mu_addon.usecases.diagnose.run import USE_CASE
+from mu_addon.studies.diagnose import Diagnose
+from mu_addon.studies.use_case import use_case
 
 from .evidence import analytic
 from .made_once import made_once
@@ -37,12 +37,12 @@ def judge(folder, gauge_kPa=0.0):
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(unit_fem, "unit_responses", responses)
         with run_to_end(Progress([messages.append])) as context:
-            job = Job(
-                read_folder(data),
-                load_preset("mu-1.0x"),
+            job = Diagnose(
+                data=read_folder(data),
+                unit=load_preset("mu-1.0x"),
                 settings=unit_fem.UnitSettings(changes=None, whole=None),
             )
-            USE_CASE.start(job, folder / "study" / "evidence", context)
+            use_case("diagnose").start(job, folder / "study" / "evidence", context)
     assert context.status == 0, messages[-1]
     (folder / "said.json").write_text(json.dumps(messages, default=str))
     return folder

@@ -23,8 +23,8 @@ from mu_addon.measured import read_folder
 from mu_addon.meshing.settings import MeshSettings
 from mu_addon.run.context import RunContext
 from mu_addon.run.progress import Progress
-from mu_addon.usecases.diagnose.job import Job
-from mu_addon.usecases.diagnose.run import USE_CASE
+from mu_addon.studies.diagnose import Diagnose
+from mu_addon.studies.use_case import use_case
 from mu_addon.usecases.diagnose.unknown import unknown_of
 
 DATA = Path(__file__).parents[2] / "assets" / "examples" / "paper-bending"
@@ -52,9 +52,9 @@ def main() -> None:
         workers=options.workers,
     )
     unknown = unknown_of(options.unknown, load_preset(PRESET)) if options.unknown else None
-    job = Job(read_folder(DATA), settings=settings, unknown=unknown)
+    study = Diagnose(data=read_folder(DATA), settings=settings, unknown=unknown)
     context = RunContext(Progress())
-    USE_CASE.start(job, options.folder, context)
+    use_case("diagnose").start(study.complete(), options.folder, context)
     if unknown is not None:
         print_shapes(context.summary.pop("unknown"))
     print(json.dumps(context.summary, indent=1, default=str))

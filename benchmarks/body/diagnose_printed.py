@@ -22,7 +22,7 @@ from benchmarks.evidence.second_code.judging import verdict_on
 from benchmarks.evidence.second_code.recording import Trial, instrument, read, write
 from benchmarks.table import circumstances, options_of, print_row
 from mu_addon.design.parameters import Unit, load_preset, to_toml
-from mu_addon.evidence.unit_effects import FLAT_OBSTACLE, Body
+from mu_addon.evidence.unit_body import Body
 from mu_addon.evidence.unit_run import Run, run
 from mu_addon.files import write_text
 from mu_addon.meshing.settings import MeshSettings
@@ -45,7 +45,7 @@ SETS: dict[str, tuple[str, float]] = {
     "skin": ("skin_cure", 0.15),
     "clog": ("clogged_chamber", 0.5),
     "gravity": ("gravity", 1150.0),
-    "obstacle": (FLAT_OBSTACLE.name, -1.0),
+    "obstacle": ("contact", -1.0),
 }
 
 

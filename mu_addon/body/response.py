@@ -16,7 +16,7 @@ from scipy import sparse
 from ..design.dimensions import Dimensions
 from ..design.lattice import graded
 from ..errors import InputError
-from ..fem.kinematics import Probe
+from ..fem.embedding import Probe
 from ..fem.materials import Materials
 from ..fem.model import Model
 from ..fem.trajectory import Trajectory

@@ -107,15 +107,10 @@ def add_scheduler(command: argparse.ArgumentParser) -> None:
     )
 
 
-def add_model(command: Group) -> None:
-    """--model, the result of a diagnosis."""
-    command.add_argument(
-        "--model",
-        metavar="FILE",
-        help=(
-            "Extended model, the model.toml of `diagnose`: its identified effects are applied to the unit."
-        ),
-    )
+def add_model(command: Group, text: str = "") -> None:
+    """--model, the result of a diagnosis; text: what it is for."""
+    applied = "Extended model, the model.toml of `diagnose`: its identified effects are applied to the unit."
+    command.add_argument("--model", metavar="FILE", help=text or applied)
 
 
 def add_orientation(command: Group) -> None:

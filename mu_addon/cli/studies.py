@@ -38,7 +38,7 @@ def _add_unit(command: Any, one: Any) -> None:
 
 
 def _unit(options: argparse.Namespace, context: RunContext, one: Any, values: dict[str, Any]) -> Any:
-    if one.modelled and hasattr(options, "model"):
+    if one.modelled and one.needed and not one.default:
         return modelled_unit(options, context)
     from ..design.parameters import load_preset
 

@@ -31,7 +31,9 @@ if TYPE_CHECKING:
     from .sensitivity import Sensitivity as Sensitivity
     from .simulator import Composite as Composite
     from .simulator import Simulator as Simulator
+    from .simulator import bends as bends
     from .simulator import unit_behind as unit_behind
+    from .simulators import bending_freely as bending_freely
     from .simulators import of_a_unit as of_a_unit
     from .simulators import simulations_plan as simulations_plan
     from .unit_fem import UnitSettings as UnitSettings

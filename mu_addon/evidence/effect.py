@@ -4,21 +4,20 @@ from __future__ import annotations
 
 import math
 import re
-from collections.abc import Sequence
 
 import attrs
 
 from ..errors import InputError
-from ..measured import Experiment
-from .effects import DECLARED
+from .effects import DECLARED, laws_of
+from .effects.declaration import Data, Law
 from .parameter import OF as OF
 from .parameter import Parameter as Parameter
 from .parameter import factor as factor
 
 # Another modulus of one specimen: an effect of specimens alone, see `owned`.
 BATCH = "batch_variation"
-# A mistyped height, a change between two tests, a factor of fast tests: of some experiments alone.
-GEOMETRY, STEP, HEATING = "geometry_as_typed", "step_change", "self_heating"
+# A mistyped height, a change between two tests: of some experiments alone.
+GEOMETRY, STEP = "geometry_as_typed", "step_change"
 # Struts printed thicker or thinner than drawn, unlike another specimen's: see `owned`.
 THICKNESS = "strut_thickness"
 # A factor on the force of some tests; of which causes, `scaled_by` tells.
@@ -115,13 +114,21 @@ class Effect:
         return tuple(found)
 
 
-def laws(kind: str, experiments: Sequence[Experiment]) -> tuple[Effect, ...]:
-    """Laws, for a kind of experiment, of the effects that act by their own files."""
+def offered(data: Data) -> tuple[Effect, ...]:
+    """Laws of every effect that experiments of a kind may show, bounded by them."""
     return tuple(
-        Effect(name, parameters, (kind,))
-        for name, declared in DECLARED.items()
-        for parameters in declared.laws(kind, experiments)
+        _effect(name, law, data.kind)
+        for name, laws in laws_of(data.kind).items()
+        for template in laws
+        if template is not DECLARED[name].differs
+        for law in template.offered(template, data)
     )
+
+
+def _effect(name: str, law: Law, kind: str) -> Effect:
+    words = law.mechanism or DECLARED[name].mechanism
+    found = Effect(name, law.parameters, (kind,), words, refines=law.refines, tried=law.tried)
+    return attrs.evolve(found, reveals=law.reveals) if law.reveals else found
 
 
 def readable(name: str) -> str:

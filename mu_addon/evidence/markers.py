@@ -9,7 +9,8 @@ import attrs
 import numpy as np
 
 from ..errors import InputError
-from ..fem.kinematics import Probe, probe
+from ..fem.embedding import Probe
+from ..fem.kinematics import probe
 from ..measured import Experiment
 from ..measured.pose import at_rest
 from ..meshing.mesh import AXES, Mesh, boundary_faces

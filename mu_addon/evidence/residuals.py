@@ -15,10 +15,9 @@ from ..errors import InputError
 from ..measured import Experiment
 from ..measured.pose import at_rest
 from .fit import Fit, Fitter
+from .lags import DEADBAND_kPa, cycles, play_operator
 from .noise import cycle_s, harmonics
-from .prediction.effective_pressure import play_operator
 from .prediction.unit_pressure import KIND as UNIT
-from .prediction.unit_pressure import cycles
 from .record import KNOWN, Record, Series, repeats
 from .ringing import modes, ringing
 
@@ -99,7 +98,7 @@ def _rate(e: Experiment) -> Array:
 
 
 def _direction(e: Experiment) -> Array:
-    return np.sign(np.gradient(play_operator(e["pressure_kPa"], 0.2)))
+    return np.sign(np.gradient(play_operator(e["pressure_kPa"], DEADBAND_kPa)))
 
 
 def _most(e: Experiment) -> Array:

@@ -11,10 +11,11 @@ import numpy as np
 
 from .effect import CURVED_CELL, FORCE_SCALE, NUMERICS, Effect
 from .effects import CAMERA, GRIPS
+from .effects.declaration import MACHINE
 from .fit import Fit, Fitter
 from .found_causes import LAW, RIVAL_DELTA_CHI2, TOGETHER, Cause, Selection, not_distinguished
 from .hypotheses import HALF_WAY, PROMISING, SEEDS, beside, by_search, cost, promise, ranked, refined
-from .owned import MACHINE, owned_effects
+from .owned import owned_effects
 from .plausibility import value_at_a_bound
 from .residuals import strict_table
 from .sensitivity import Sensitivity

@@ -7,8 +7,8 @@ from collections.abc import Callable, Sequence
 import attrs
 
 from .acceptance import accepted, doubts, loss, of_the_law, too_far
-from .effect import BATCH, CURVED_CELL, HEATING, OF, STEP, THICKNESS, Effect
-from .effects import CAMERA
+from .effect import BATCH, CURVED_CELL, OF, Effect
+from .effects import CAMERA, DECLARED
 from .fit import Fit, Fitter
 from .found_causes import FALSE_ALARM_RATE, LAW, RIVAL_DELTA_CHI2, Cause, Selection
 from .hypotheses import SEEDS, beside, by_all_laws, by_search, cost, hypotheses, other_seeds, ranked, refined
@@ -23,8 +23,8 @@ MOST_EFFECTS = 3
 # Ratio of the gain by scales of single tests to a first effect's, above which no second is tried.
 ELSEWHERE = 4.0
 # Changes of the scale of some tests, and what differs among specimens that would do as much.
-OF_SOME = frozenset((STEP, HEATING))
-OF_SPECIMENS = frozenset((BATCH, THICKNESS))
+OF_SOME = frozenset(name for name, e in DECLARED.items() if e.groups and e.modulus)
+OF_SPECIMENS = frozenset(name for name, e in DECLARED.items() if e.differs and not e.groups)
 # Faults that two physical effects together imitate.
 IMITATED = CAMERA | {CURVED_CELL}
 # Most effects of owners that are fitted, the most promising first.

@@ -15,8 +15,9 @@ from ..design.settings import PRESET
 from ..errors import InputError
 from ..measured import Experiment
 from ..measured.kinds import OF_A_UNIT
-from .effect import GEOMETRY, OF, THICKNESS, Effect, Parameter
-from .effects import MODULI, acted
+from .effect import OF, Effect, Parameter
+from .effects import MODULI, Acting, laws_of
+from .effects.declaration import Setting
 
 Array = np.ndarray[Any, Any]
 
@@ -146,11 +147,8 @@ class Composite:
         if key in self._kept:
             self._kept.move_to_end(key)
             return self._kept[key][1]
-        found = simulator.predict(_strained(experiment, own), own)
-        first = found[0]
-        read = acted("reading", experiment, first, own)
-        if read is not first:
-            found = np.vstack([read, found[1:]])
+        acting = Acting(experiment.kind, own, Setting(experiment=experiment))
+        found = np.asarray(acting.along(simulator.predict(_strained(acting), own), "shown"))
         found.flags.writeable = False
         self.calls += 1
         # Stored with the experiment, whose identity could otherwise be reused.
@@ -172,7 +170,7 @@ class Composite:
             if not (whose in owners or name in self.groups.get(whose, ())):
                 continue
             effect = plain.partition(".")[0]
-            if plain in knows or effect in (GEOMETRY, THICKNESS):
+            if plain in knows or effect in laws_of(experiment.kind):
                 own[plain] = value
             elif effect in MODULI:
                 moduli = (p for p in self.nuisances if p.name in knows and MODULUS in p.name)
@@ -189,12 +187,12 @@ class Composite:
         return self._simulators[experiment.kind]
 
 
-def _strained(experiment: Experiment, values: Mapping[str, float]) -> Experiment:
+def _strained(acting: Acting) -> Experiment:
     """The experiment with the strain of effects that act on it."""
-    typed = experiment.columns.get("strain")
-    strain = typed if typed is None else acted("strain", experiment, typed, values)
-    if strain is typed:
+    experiment = acting.setting.experiment
+    if not acting.at("strain"):
         return experiment
+    strain = acting.along(experiment["strain"], "strain")
     return attrs.evolve(experiment, columns={**experiment.columns, "strain": strain})
 
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import warnings
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Sequence
 from contextlib import suppress
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -12,10 +12,8 @@ from ..design.parameters import Unit
 from ..errors import InputError
 from ..measured import Experiment
 from ..measured.kinds import OF_A_UNIT
-from ..run.progress import Progress
 from ..run.progress_estimate import Plan
-from .prediction import blocked_force, lattice_compression, pressure_step, unit_pose, unit_pressure
-from .prediction.bench import bench_simulators
+from .prediction import blocked_force, pressure_step, unit_pose, unit_pressure
 from .simulator import Simulator
 
 if TYPE_CHECKING:
@@ -26,14 +24,12 @@ LATTICE_S, UNIT_S = 90.0, 24.0
 """Seconds of the simulation of a block, and of a unit of one chamber."""
 BY_CHAMBERS = 1.6
 """Power of their number by which a unit's seconds grow: measured with three and six."""
-BASE, EFFECTS, SIZES = ("unit", "unit with each effect", "unit at every size in question")
-"""Stages of a unit's simulation: without effects, at each effect's first sizes, at the others."""
+BASE = "unit"
+"""Stage of a unit that bends freely."""
 HELD = "unit with its tip held"
 """Stage of a unit on a load cell."""
 DESIGNS, DESIGN_S = "unit of every design", 50.0
 """Stage of units with other values of unknown parameters, and the seconds of one of them."""
-SHARES = {BASE: 0.29, EFFECTS: 0.49, SIZES: 0.22}
-"""Shares of the seconds; the last stage is left out where no effect is in question."""
 TOUCHING_KPA, TOUCHING = -8.0, 2.0
 """Reading below which walls of a unit may touch, and the factor on its seconds then."""
 # Kinds of a unit that bends freely, by what predicts them.
@@ -63,59 +59,9 @@ def simulations_plan(experiments: Sequence[Experiment], behind: Unit | None, set
     return [*lattice, *free, *([(HELD, unit)] if blocked_force.KIND in kinds else [])]
 
 
-def simulators_of(
-    experiments: Sequence[Experiment],
-    unit: Unit | None,
-    cache: Path,
-    progress: Progress,
-    settings: UnitSettings | None = None,
-    stage: str = BASE,
-) -> tuple[dict[str, Simulator], list[str]]:
-    """Simulators by kind of experiment, and remarks on omissions and assumptions.
-
-    The unit and blocks of its lattice are simulated by finite elements; the runs are kept in the folder
-    `cache`. stage: name of the unit's simulation among the run's stages.
-    """
-    remarks: list[str] = []
-    scalings: Mapping[str, lattice_compression.Scaling] = {}
-    if any(e.cells for e in experiments):
-        assert unit is not None
-        from .lattice_fem import scalings as computed
-
-        with progress.stage(LATTICE):
-            scalings, remarks = computed(experiments, unit, cache, lambda _, share: progress.update(share))
-    found = bench_simulators(experiments, scalings)
-    if any(e.kind in OF_A_UNIT for e in experiments):
-        assert unit is not None
-        simulated, left_out = _of_a_unit(experiments, unit, cache, progress, settings, stage)
-        found |= simulated
-        remarks += left_out
-    return found, remarks
-
-
-def _of_a_unit(
-    experiments: Sequence[Experiment],
-    unit: Unit,
-    cache: Path,
-    progress: Progress,
-    settings: UnitSettings | None,
-    stage: str,
-) -> tuple[dict[str, Simulator], list[str]]:
-    """Simulators of the kinds in `OF_A_UNIT`, and the reasons why others could not be simulated."""
-    kinds = {e.kind for e in experiments}
-    found: dict[str, Simulator] = {}
-    left_out: list[str] = []
-    for title, wanted in ((stage, kinds & set(FREE)), (HELD, kinds & {blocked_force.KIND})):
-        if wanted:
-            with progress.stage(title):
-                simulated, reasons = of_a_unit(
-                    experiments, unit, cache, progress.update, settings, held=title == HELD
-                )
-            found |= simulated
-            left_out += reasons
-    for words in left_out:
-        progress.warning(words, "unit")
-    return found, left_out
+def bending_freely(experiments: Sequence[Experiment]) -> tuple[Experiment, ...]:
+    """Experiments on a unit that its simulation without weight and without a held tip predicts."""
+    return tuple(e for e in experiments if e.kind in (unit_pressure.KIND, pressure_step.KIND))
 
 
 def of_a_unit(

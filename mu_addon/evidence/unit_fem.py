@@ -24,13 +24,13 @@ from ..run.pool import each
 from ..run.processes import cores
 from .drawn import Designs, Surface, require_enough
 from .effect import Parameter
+from .effects import ON_UNITS
 from .markers import Marker, attached
 from .prediction import blocked_force, pressure_step, unit_pose
-from .prediction.flat_obstacle import NAME as CONTACT
-from .prediction.flat_obstacle import NEAREST, ObstacleResponse
+from .prediction.flat_obstacle import CONTACT, NEAREST, ObstacleResponse
 from .prediction.unit_pressure import KIND, UnitResponse, Variant
-from .unit_effects import EFFECTS, HELD, Body, UnitEffect
-from .unit_run import Result, Run, effect_of, run
+from .unit_body import HELD, WALL, Body
+from .unit_run import Result, Run, run
 
 Array = np.ndarray[Any, Any]
 Progress = Callable[[str, float], None]
@@ -58,7 +58,8 @@ MESH_ERROR = "mesh_error"
 # Of the way from the mesh of changes to the model's, how much farther the answer may lie: a third of it by
 # the order of the elements. In suction, where walls close, it is another at each pressure.
 FARTHER, UNEVEN = 0.5, 0.25
-KNOWN = (*EFFECTS, CONTACT)
+KNOWN = tuple(name for name, e in ON_UNITS.items() if e.of != HELD)
+OF_HELD = tuple(name for name, e in ON_UNITS.items() if e.of == HELD)
 # A second code with another mesh and another volumetric law, the same unit: its angles are ours at pressures
 # changed by 0.047 of the largest one times the square of their share of it.
 DISCREPANCY = 0.04
@@ -99,7 +100,7 @@ class UnitSettings:
 
     def further(self, names: Collection[str]) -> UnitSettings | None:
         """With some effects also at the remaining sizes; None where all are."""
-        more = frozenset({*KNOWN, HELD.name}.intersection(names))
+        more = frozenset({*ON_UNITS}.intersection(names))
         if self.whole is None or more <= self.whole:
             return None
         return attrs.evolve(self, whole=self.whole | more)
@@ -350,7 +351,8 @@ class _Plan:
     def names(self, settings: UnitSettings) -> list[str]:
         """Effects that have runs, walls apart."""
         without = MESH_ERROR if self.changes else ""
-        return [n for n in settings.effects if n in EFFECTS and n != without] + [HELD.name] * self.held
+        own = [n for n in settings.effects if ON_UNITS[n].of != WALL and n != without]
+        return [*own, *(OF_HELD if self.held else ())]
 
     def case(
         self, effect: str = "", size: float = 0.0, orientation: tuple[float, Direction] = (0.0, X)
@@ -406,15 +408,16 @@ class _Plan:
         yield self.base_case
         yield from self.of_designs()
         for name in sorted(set(self.names(settings)), key=lambda n: (n != MESH_ERROR, n)):
-            effect = effect_of(name)
+            effect = ON_UNITS[name]
             for orientation in self.orientations if effect.has_gravity else ((0.0, X),):
-                for size in self.sizes(effect):
+                for size in self.sizes(name):
                     if size != effect.parameter.null:
                         yield self.case(name, size, orientation)
 
-    def sizes(self, effect: UnitEffect) -> tuple[float, ...]:
+    def sizes(self, name: str) -> tuple[float, ...]:
         """Sizes of an effect that are run, its null among them."""
-        if self.whole is None or effect.name in self.whole:
+        effect = ON_UNITS[name]
+        if self.whole is None or name in self.whole:
             return effect.sizes_at(self.enlarged)
         return effect.first_at(self.enlarged)
 
@@ -538,12 +541,12 @@ class _Plan:
         kept: Any,
     ) -> Variant | None:
         """The response to an effect at the sizes that could be computed; None where that is one alone."""
-        effect = effect_of(name)
+        effect = ON_UNITS[name]
         null, grown = effect.parameter.null, self.enlarged**effect.length
         sizes: list[float] = []
         missed: list[float] = []
         values: list[Array] = []
-        for size in self.sizes(effect):
+        for size in self.sizes(name):
             if size == null:
                 result = base
             else:
@@ -559,7 +562,7 @@ class _Plan:
         if len(sizes) < 2:
             return None
         # Beyond a size that was not, or could not be, computed the effect is unknown.
-        missed += [size * grown for size in effect.sizes_at(self.enlarged) if size not in self.sizes(effect)]
+        missed += [size * grown for size in effect.sizes_at(self.enlarged) if size not in self.sizes(name)]
         low = sizes[0] if any(m < sizes[0] for m in missed) else -math.inf
         high = sizes[-1] if any(m > sizes[-1] for m in missed) else math.inf
         return Variant(effect.parameter.narrowed(low, high), np.array(sizes), np.array(values))

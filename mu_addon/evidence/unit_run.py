@@ -21,9 +21,10 @@ from ..fem.trajectory import branches
 from ..fem.unit_materials import self_contact_of
 from ..measured.pose import X
 from ..run.cache import Cache
+from .effects import ON_UNITS
+from .effects.contact import with_flat_obstacle
 from .markers import material_points
-from .prediction.flat_obstacle import NAME as CONTACT
-from .unit_effects import EFFECTS, FLAT_OBSTACLE, HELD, Body, UnitEffect, with_flat_obstacle
+from .unit_body import Body, UnitEffect
 
 Array = np.ndarray[Any, Any]
 
@@ -34,11 +35,6 @@ HELD_STEPS = 4
 # Name in the cache of the displacements of runs without an effect.
 STATES = "states"
 NOTHING: Mapping[int, Array] = MappingProxyType({})
-
-
-def effect_of(name: str) -> UnitEffect:
-    """Static effect of a name, walls and a load cell's place included."""
-    return FLAT_OBSTACLE if name == CONTACT else {**EFFECTS, HELD.name: HELD}[name]
 
 
 @attrs.frozen
@@ -74,7 +70,7 @@ class Run:
         """
         if not self.effect:
             return self.body, None
-        effect = effect_of(self.effect)
+        effect = ON_UNITS[self.effect]
         body = effect.body(self.body, self.size) if effect.body else self.body
         if effect.has_gravity:
             body = body.whole
@@ -86,14 +82,14 @@ class Run:
             body, effect = self.changed
         except InputError:
             # No such body: its failure is kept, too.
-            body, effect = self.body, effect_of(self.effect)
+            body, effect = self.body, ON_UNITS[self.effect]
         parts = [REVISION, body.unit.hash(), attrs.astuple(body.mesh), self.pressures_kPa, self.points]
         parts += [body.newton(effect)]
         if body.drawn:
             parts += [body.drawn.hash()]
         if effect:
-            parts += [effect.name, self.size]
-            parts += [body.distal if effect.name == "clogged_chamber" else 0]
+            parts += [self.effect, self.size]
+            parts += [body.distal if self.effect == "clogged_chamber" else 0]
             parts += [_turned(body) if effect.has_gravity else 0.0]
         if body.self_contact:
             parts += ["self-contact"]

@@ -20,9 +20,9 @@ if TYPE_CHECKING:
     from .dead_loads import gravity as gravity
     from .dead_loads import traction as traction
     from .embedding import Embedding as Embedding
+    from .embedding import Probe as Probe
     from .embedding import embed as embed
     from .equilibrium import Equilibrium as Equilibrium
-    from .kinematics import Probe as Probe
     from .kinematics import probe as probe
     from .lattice_law import LatticeLaw as LatticeLaw
     from .laws import Foam as Foam

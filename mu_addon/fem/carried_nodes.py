@@ -30,6 +30,8 @@ class Carried:
     node of one section. Between two sections, a is shorter by half the other's share of the distance (midway
     by a quarter): the axis is then the parabola with the sections as its normals, and their shear is the
     beam's.
+
+    Attributes: nodes, the carried ones; turns (t,), nodes with the rotation vectors of what carries them.
     """
 
     def __init__(self, mesh: Mesh) -> None:
@@ -40,42 +42,41 @@ class Carried:
         self.count = len(mesh.nodes)
         self.nodes = mesh.carried
         self._own, self._node, self._turn = own, node[own, side], turn[own, side]
-        self._turns, self._of = np.unique(self._turn, return_inverse=True)
+        self.turns, self._of = np.unique(self._turn, return_inverse=True)
         self._share = shares[own, side]
         # Shares of three places in each arm: the carried node's, the section's and the other section's.
         self._other = node[own, 1 - side]
         self._less = (0.5 * (1.0 - self._share))[:, None]
         x = mesh.nodes
         self._arm = x[mesh.carried[own]] - (1.0 - self._less) * x[self._node] - self._less * x[self._other]
+        levers, three = self._share[:, None] * self._arm, np.arange(3)
+        # Of each pair its arm by the three axes of its section, times its share; of each node their sum.
+        self._levers = sparse.csr_matrix(
+            (levers.ravel(), (3 * self._of[:, None] + three).ravel(), np.arange(0, 3 * len(own) + 1, 3)),
+            shape=(len(own), 3 * len(self.turns)),
+        )
+        pairs = len(self.nodes), len(own)
+        of_node = sparse.csr_matrix((np.ones(len(own)), (own, np.arange(len(own)))), shape=pairs)
+        self._turned = sparse.csr_matrix(of_node @ self._levers)
+        self._means = sparse.csr_matrix((self._share, (own, self._node)), shape=(len(self.nodes), self.count))
+        # Operators that do not depend on the displacement, and the last rotation vectors with all of theirs.
+        eye = np.eye(3)[None]
+        self._moving = np.concatenate([eye, self._share[:, None, None] * eye])
+        self._last: tuple[Array, Array] | None = None
 
     def follow(self, u: Array) -> Array:
         """Displacements u (n, 3) in mm with those of carried nodes set, in place."""
-        turned = rotation(u[self._turns])[self._of]
-        moved = np.einsum("kij,kj->ki", turned, self._arm) - self._arm + u[self._node]
-        for axis in range(3):
-            u[self.nodes, axis] = np.bincount(self._own, self._share * moved[:, axis], len(self.nodes))
+        turned = rotation(u[self.turns]) - np.eye(3)
+        u[self.nodes] = self._turned @ turned.transpose(0, 2, 1).reshape(-1, 3) + self._means @ u
         return u
 
-    def slopes(self, u: Array) -> Array:
-        """Slopes (k, 3, 3) of each carried node's displacement by a rotation vector, its share included."""
-        return np.einsum("kiaj,ka->kij", self._by_axis(u), self._share[:, None] * self._arm)
-
-    def _by_axis(self, u: Array) -> Array:
-        """Slopes (k, 3, 3, 3) of each pair's three turned axes, its second index, by its rotation vector."""
-        return np.asarray(self._by_turn(u)[self._of])
-
     def _by_turn(self, u: Array) -> Array:
-        """Slopes (t, 3, 3, 3) of each turning section's axes, as `_by_axis` has them."""
-        return np.stack([turned_slopes(u[self._turns], arm) for arm in self._axes()], axis=2)
+        """Slopes (t, 3, 3, 3) of sections' turned axes, the second index, by their rotation vectors."""
+        return np.stack([turned_slopes(u[self.turns], arm) for arm in self._axes()], axis=2)
 
     def _moments(self, forces: Array) -> Array:
         """Sums (t, 3, 3) in N mm, over the nodes of a section, of arms by axis times forces (n, 3) in N."""
-        acting = self._share[:, None] * forces[self.nodes[self._own]]
-        found = np.empty((len(self._turns), 3, 3))
-        for axis, i in np.ndindex(3, 3):
-            lever = self._arm[:, axis] * acting[:, i]
-            found[:, axis, i] = np.bincount(self._of, lever, len(self._turns))
-        return found
+        return np.asarray(self._turned.T @ forces[self.nodes]).reshape(-1, 3, 3)
 
     def by_places(self, u: Array, forces: Array, v: Array | None = None) -> Array:
         """Derivative (n, 3), by all nodes' positions, of forces (n, 3) times the motion of carried nodes.
@@ -85,10 +86,10 @@ class Carried:
         """
         acting = self._share[:, None] * forces[self.nodes[self._own]]
         if v is None:
-            turned = rotation(u[self._turns])[self._of]
+            turned = rotation(u[self.turns])[self._of]
             by_arm = np.einsum("kij,ki->kj", turned, acting) - acting
         else:
-            by_arm = np.einsum("kiaj,ki,kj->ka", self._by_axis(u), acting, v[self._turn])
+            by_arm = np.einsum("kiaj,ki,kj->ka", self._by_turn(u)[self._of], acting, v[self._turn])
         found = np.zeros_like(u)
         np.add.at(found, self.nodes[self._own], by_arm)
         np.subtract.at(found, self._node, (1.0 - self._less) * by_arm)
@@ -97,41 +98,43 @@ class Carried:
 
     def _axes(self) -> Array:
         """The three axes as arms of each turning section, (3, t, 3)."""
-        return np.broadcast_to(np.eye(3)[:, None], (3, len(self._turns), 3))
+        return np.broadcast_to(np.eye(3)[:, None], (3, len(self.turns), 3))
 
     def fold(self, u: Array, forces: Array) -> Array:
         """Forces (n, 3) in N with those on carried nodes passed on to beams, in place; couples in N mm."""
         # Summed by section first: there are sixty times as many pairs.
-        forces[self._turns] += np.einsum("tiaj,tai->tj", self._by_turn(u), self._moments(forces))
-        acting = self._share[:, None] * forces[self.nodes[self._own]]
-        for axis in range(3):
-            forces[:, axis] += np.bincount(self._node, acting[:, axis], len(forces))
+        forces[self.turns] += np.einsum("tiaj,tai->tj", self._by_turn(u), self._moments(forces))
+        forces += self._means.T @ forces[self.nodes]
         forces[self.nodes] = 0.0
         return forces
 
-    def turning(self, u: Array, forces: Array, convex: bool = False) -> tuple[Array, Array]:
-        """Stiffness (t, 3, 3) in N mm of rotation vectors under forces (n, 3) in N on carried nodes.
+    def turning(self, u: Array, forces: Array, convex: bool = False) -> Array:
+        """Stiffness (t, 3, 3) in N mm of `turns` under forces (n, 3) in N on carried nodes.
 
-        Also returned: the nodes (t,) that carry them. It is the stiffness of forces of fixed direction as
-        their arms rotate. convex: each without its negative eigenvalues. Contact on both sides of a strut
-        otherwise turns it over, since its forces before equilibrium are far larger than there.
+        It is that of forces of fixed direction as their arms rotate. convex: each without its negative
+        eigenvalues. Contact on both sides of a strut otherwise turns it over, since its forces before
+        equilibrium are far larger than there.
         """
         moments = self._moments(forces)
-        found = np.zeros((len(self._turns), 3, 3))
+        found = np.zeros((len(self.turns), 3, 3))
         for axis, arm in enumerate(self._axes()):
-            found += turned_curvature(u[self._turns], arm, moments[:, axis])
+            found += turned_curvature(u[self.turns], arm, moments[:, axis])
         if convex:
             values, axes = np.linalg.eigh(found)
             found = (axes * np.maximum(values, 0.0)[:, None, :]) @ axes.transpose(0, 2, 1)
-        return found, self._turns
+        return found
 
     def operators(self, u: Array) -> Array:
         """Derivatives (1 + 2 k, 3, 3) of a node's displacement, by itself and by its beam nodes' unknowns.
 
         The k shares come first, then the k slopes by rotation vectors.
         """
-        same = np.eye(3)[None]
-        return np.concatenate([same, self._share[:, None, None] * same, self.slopes(u)])
+        vectors = u[self.turns]
+        if self._last is None or not np.array_equal(vectors, self._last[0]):
+            by_axis = self._by_turn(u).transpose(0, 2, 1, 3).reshape(-1, 9)
+            slopes = np.asarray(self._levers @ by_axis).reshape(-1, 3, 3)
+            self._last = vectors, np.concatenate([self._moving, slopes])
+        return self._last[1]
 
     def parts_of(self, nodes: Array) -> tuple[Array, Array, Array]:
         """Node, beam node and operator of every pair in which a beam node moves one of the nodes (j,)."""

@@ -9,8 +9,6 @@ import warp as wp
 
 from ..errors import InputError
 from ..meshing.mesh import AXES, TRIANGLE_EDGES
-from . import follower_pressure
-from .laws.tensors import mat33
 from .model import MaterialData, Model
 
 if TYPE_CHECKING:
@@ -40,64 +38,23 @@ class CloggedModel(Model):
             raise InputError(
                 f"no cavity is cut at z = {height_mm:g} mm", "clogged chamber", "give the height of a neck"
             )
-        self.share_lost = share_lost
+        self._lost = share_lost
         self._beyond = np.flatnonzero(beyond)
+        self._shares = self._put(np.where(beyond, 1 - share_lost, 1.0), wp.float64)
         self._rim = _rim(mesh, mesh.cavity[beyond])
         self._rim_nodes = np.unique(self._rim)
-        faces = mesh.cavity[beyond].astype(np.int32)
-        count, k = faces.shape
-        self._lost_faces = self._put(faces, int)
-        self._lost_volume = wp.zeros(count, dtype=wp.float64, device=self.device)
-        self._lost_force = wp.zeros((count, k), dtype=wp.vec3d, device=self.device)
-        self._pairs = k * (k + 1) // 2
-        self._lost_blocks = wp.zeros(count * self._pairs, dtype=mat33, device=self.device)
 
-    def potential(self, u: Array, pressure: float, m: MaterialData) -> float:
-        """Potential in mJ at u (n, 3) in mm and pressure in MPa, as `Model.potential`.
-
-        The part beyond the clog counts with 1 - share_lost of the pressure.
-        """
-        return super().potential(u, pressure, m) + self.share_lost * pressure * self.volume_beyond(u)
+    def _pressure_work(self, pressure: float) -> float:
+        return super()._pressure_work(pressure) - self._lost * pressure * self._within_cone()
 
     def residual(self, u: Array, pressure: float, m: MaterialData) -> Array:
         """Internal minus external forces (n, 3) in N at u (n, 3) in mm and pressure in MPa.
 
-        As `Model.residual`, with the pressure reduced beyond the clog, and with its difference on the clog's
-        cone, which the rim's nodes carry.
+        As `Model.residual`, with the pressure's difference on the clog's cone, which the rim's nodes carry.
         """
         residual = super().residual(u, pressure, m)
-        lost = -self.share_lost * pressure
-        inputs = [lost, self._x, self._lost_faces, *self._face_rule, 0, self._lost_force]
-        wp.launch(follower_pressure.pressure_force, len(self._beyond), inputs, device=self.device)
-        np.add.at(residual, self.mesh.cavity[self._beyond], self._lost_force.numpy())
-        self._add_cone(residual, self.mesh.nodes + u, lost)
+        self._add_cone(residual, self.mesh.nodes + u, -self._lost * pressure)
         return residual
-
-    def tangent(self, u: Array, pressure: float, m: MaterialData, convex: bool = False) -> Array:
-        """Values (nnz,) in N/mm of the tangent, as `Model.tangent`, without the part of the clog's cone.
-
-        u: (n, 3) in mm; pressure in MPa; convex changes nothing, since such a body has no self-contact.
-        """
-        self._place(u)
-        self._launch_layers("stiffness", m, [self._mean_slope, self._block_parts])
-        inputs = [self._x, self._faces, *self._face_rule, self._element_blocks, self._block_parts]
-        wp.launch(
-            follower_pressure.pressure_stiffness,
-            len(self.mesh.cavity),
-            [pressure, *inputs],
-            device=self.device,
-        )
-        if self.share_lost:
-            inputs = [self._x, self._lost_faces, *self._face_rule, 0, self._lost_blocks]
-            lost = -self.share_lost * pressure
-            wp.launch(
-                follower_pressure.pressure_stiffness, len(self._beyond), [lost, *inputs], device=self.device
-            )
-            parts = self._block_parts.numpy()
-            at = self._element_blocks + self._beyond[:, None] * self._pairs + np.arange(self._pairs)
-            parts[at.ravel()] += self._lost_blocks.numpy()
-            self._block_parts.assign(parts)
-        return self._values(u, pressure, m)
 
     def volume_beyond(self, u: Array) -> float:
         """Volume in mm3 that the cavity beyond the clog, the clog's cone and the mirror planes enclose.
@@ -105,13 +62,15 @@ class CloggedModel(Model):
         u: displacements (n, 3) in mm.
         """
         self._place(u)
-        inputs = [self._x, self._lost_faces, *self._face_rule, self._lost_volume]
-        wp.launch(follower_pressure.enclosed_volume, len(self._beyond), inputs, device=self.device)
-        x = self.mesh.nodes + u
+        return float(self._face_volumes()[self._beyond].sum()) + self._within_cone()
+
+    def _within_cone(self) -> float:
+        """Volume in mm3 between the clog's cone and the origin, at the displacement in `_place`."""
+        x = self._x.numpy()
         apex = self._apex(x)
         _, area = self._cone(x, apex)
         # On a cone x - apex lies in the surface; its normal points into the part beyond.
-        return float(self._lost_volume.numpy().sum() - apex @ area.sum(axis=0) / 3)
+        return -float(apex @ area.sum(axis=0)) / 3
 
     def _apex(self, x: Array) -> Array:
         apex = x[self._rim_nodes].mean(axis=0)

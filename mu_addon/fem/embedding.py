@@ -8,8 +8,8 @@ import attrs
 import numpy as np
 
 from ..meshing.mesh import TET_EDGES, Mesh, boundary_faces
+from ..meshing.quality import shapes
 from .elements import shape_functions, shape_gradients
-from .kinematics import Probe, invert
 
 Array = np.ndarray[Any, Any]
 
@@ -19,6 +19,23 @@ _BULGES = (0.1, 0.7)
 _INSIDE = 1e-6
 _BLOCK = 20_000
 _NEIGHBOURS = 16
+# A smaller Newton step in reference coordinates is not followed by another.
+_SETTLED = 1e-9
+
+
+@attrs.frozen(eq=False)
+class Probe:
+    """Points of a mesh, read in any of its states.
+
+    nodes (p, n): of the element that each point lies in; weights (p, n): the element's shape functions there.
+    """
+
+    nodes: Array
+    weights: Array
+
+    def displacement(self, u: Array) -> Array:
+        """Displacements (p, 3) in mm at the points, of nodal displacements (n, 3)."""
+        return np.einsum("pn,pni->pi", self.weights, u[self.nodes])
 
 
 @attrs.frozen(eq=False)
@@ -110,6 +127,32 @@ class Footholds:
         return _weights(nodes[self.tets[rows]], self.at[rows], self.held[rows], points[rows])
 
 
+def _inverted(nodes: Array, points: Array, local: Array) -> Array:
+    """Reference coordinates (e, 3) of a point in each of e curved elements, by Newton's method.
+
+    nodes (e, 10, 3) and points (e, 3) in mm. local (e, 3): start, changed in place; -1 if the map becomes
+    singular.
+    """
+    left = np.arange(len(local))
+    for _ in range(8):
+        own = nodes[left]
+        bary = np.column_stack([1 - local[left].sum(axis=1), local[left]])
+        shape, slope = shapes(bary, TET_EDGES, 2)
+        away = points[left] - np.einsum("en,eni->ei", shape, own)
+        jacobian = np.einsum("eni,enj->eij", own, slope)
+        # A point far outside an element may meet a singular map; such an element is not its home.
+        good = np.abs(np.linalg.det(jacobian)) > 1e-12
+        local[left[~good]] = -1.0
+        left = left[good]
+        step = np.clip(np.linalg.solve(jacobian[good], away[good][:, :, None])[:, :, 0], -1, 1)
+        local[left] += step
+        # The next step would be the square of this one, below the last digit.
+        left = left[np.abs(step).max(axis=1, initial=0.0) > _SETTLED]
+        if not len(left):
+            break
+    return local
+
+
 def _barycentric(local: Array) -> Array:
     return np.column_stack([1 - local.sum(axis=1), local])
 
@@ -135,7 +178,7 @@ def _elements(mesh: Mesh, points: Array) -> tuple[Array, Array]:
             point, tet, at, depth = point[close], tet[close], at[close], depth[close]
             bent = np.flatnonzero(curved[tet])
             if len(bent):
-                at[bent] = invert(nodes[tet[bent]], points[point[bent]], at[bent])
+                at[bent] = _inverted(nodes[tet[bent]], points[point[bent]], at[bent])
                 depth[bent] = _barycentric(at[bent]).min(axis=1)
             # Where elements meet, the one that a point lies deepest in.
             order = np.lexsort((-depth, point))
@@ -227,6 +270,6 @@ def _nearest(mesh: Mesh, points: Array) -> tuple[Array, Array, Array, Array]:
     edges = (nodes[:, 1:4] - nodes[:, :1]).transpose(0, 2, 1)
     local = np.linalg.solve(edges, (surface - nodes[:, 0])[:, :, None])[:, :, 0]
     if mesh.order == 2:
-        local = invert(nodes, surface, local)
+        local = _inverted(nodes, surface, local)
     held = np.isin(faces[face], mesh.base).all(axis=1)
     return element, _barycentric(local), held, away[rows, best]

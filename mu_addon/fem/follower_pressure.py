@@ -36,18 +36,18 @@ def enclosed_volume(
 @wp.kernel
 def pressure_force(
     pressure: f64,
+    share: wp.array(dtype=f64),
     x: wp.array(dtype=vec3),
     faces: wp.array2d(dtype=int),
     dN: wp.array3d(dtype=f64),
     N: wp.array2d(dtype=f64),
     weight: wp.array(dtype=f64),
-    first: int,
     out: wp.array2d(dtype=vec3),
 ):
-    """Internal-minus-external force of a follower pressure: + p n da on every node of a face."""
+    """Internal-minus-external force of each face's share of a follower pressure: + p n da on its nodes."""
     f = wp.tid()
     for a in range(faces.shape[1]):
-        out[first + f, a] = vec3()
+        out[f, a] = vec3()
     for q in range(N.shape[0]):
         s = vec3()
         t = vec3()
@@ -55,14 +55,15 @@ def pressure_force(
             p = x[faces[f, a]]
             s += dN[q, a, 0] * p
             t += dN[q, a, 1] * p
-        area = pressure * weight[q] * wp.cross(s, t)
+        area = share[f] * pressure * weight[q] * wp.cross(s, t)
         for a in range(faces.shape[1]):
-            out[first + f, a] = out[first + f, a] + N[q, a] * area
+            out[f, a] = out[f, a] + N[q, a] * area
 
 
 @wp.kernel
 def pressure_stiffness(
     pressure: f64,
+    share: wp.array(dtype=f64),
     x: wp.array(dtype=vec3),
     faces: wp.array2d(dtype=int),
     dN: wp.array3d(dtype=f64),
@@ -73,7 +74,7 @@ def pressure_stiffness(
 ):
     """Tangent of `pressure_force`, symmetrised a face.
 
-    On a closed cavity (or one closed by symmetry planes) the assembled tangent is symmetric, because a
+    On a closed cavity (or one closed by symmetry planes) the assembled tangent is symmetric, because its
     uniform pressure has the potential -p V; the sum of the faces' symmetric parts is therefore the same.
     """
     f = wp.tid()
@@ -86,7 +87,7 @@ def pressure_stiffness(
             p = x[faces[f, a]]
             s += dN[q, a, 0] * p
             t += dN[q, a, 1] * p
-        w = pressure * weight[q]
+        w = share[f] * pressure * weight[q]
         for a in range(n):
             for b in range(a, n):
                 # N_a d(s x t) by node b, and the other way round.

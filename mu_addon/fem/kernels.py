@@ -72,6 +72,7 @@ def cofactors(F: mat33) -> mat33:
 @wp.kernel
 def mean_dilatation(
     first: int,
+    elements: wp.array(dtype=int),
     u: wp.array(dtype=vec3),
     tets: wp.array2d(dtype=int),
     G: wp.array3d(dtype=vec3),
@@ -79,8 +80,8 @@ def mean_dilatation(
     mean_J: wp.array(dtype=f64),
     slope: wp.array2d(dtype=vec3),
 ):
-    """Mean of det F over an element, and its derivatives by the nodes' displacements."""
-    e = first + wp.tid()
+    """Mean of det F over each of some elements, and its derivatives by the nodes' displacements."""
+    e = elements[first + wp.tid()]
     total = f64(0.0)
     swept = f64(0.0)
     for a in range(tets.shape[1]):
@@ -372,4 +373,25 @@ def gather_blocks(
             total += parts[j]
         else:
             total += wp.transpose(parts[-j - 1])
+    out[i] = total
+
+
+@wp.kernel
+def spread_blocks(
+    first: int,
+    parts: wp.array(dtype=mat33),
+    start: wp.array(dtype=int),
+    index: wp.array(dtype=int),
+    weight: wp.array(dtype=f64),
+    out: wp.array(dtype=mat33),
+):
+    """As `gather_blocks`, each contribution times its weight."""
+    i = first + wp.tid()
+    total = mat33()
+    for k in range(start[i], start[i + 1]):
+        j = index[k]
+        if j >= 0:
+            total += weight[k] * parts[j]
+        else:
+            total += weight[k] * wp.transpose(parts[-j - 1])
     out[i] = total

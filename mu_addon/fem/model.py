@@ -159,10 +159,13 @@ class Model:
             put(shape, wp.float64),
             put(weight, wp.float64),
         )
+        # Of the pressure, on each face.
+        self._shares = put(np.ones(f), wp.float64)
         self._energy = wp.empty(m, dtype=wp.float64, device=device)
         # Elements of beams have neither.
         self._energy.zero_()
         self._smallest_J = wp.full(m, 1.0, dtype=wp.float64, device=device)
+        self._acting = put(np.flatnonzero(mesh.solid), int)
         means = m if self._takes_means else 0
         self._mean_J = wp.empty(means, dtype=wp.float64, device=device)
         self._mean_slope = wp.empty((means, k), dtype=wp.vec3d, device=device)
@@ -172,7 +175,10 @@ class Model:
 
         self._parts = wp.zeros(m * k + f * kf, dtype=wp.vec3d, device=device)
         self._element_force = self._parts[: m * k].reshape((m, k))
-        self._face_force = self._parts[m * k :].reshape((f, kf)) if f else None
+        faces = (
+            self._parts[m * k :].reshape((f, kf)) if f else wp.empty((0, kf), dtype=wp.vec3d, device=device)
+        )
+        self._face_force = faces
         start, index = _lists(np.concatenate([mesh.tets.ravel(), mesh.cavity.ravel()]), n)
         self._node_lists = put(start, int), put(index, int)
         self._residual = wp.empty(n, dtype=wp.vec3d, device=device)
@@ -226,9 +232,10 @@ class Model:
         self._block_parts = wp.zeros(parts, dtype=mat33, device=self.device)
         self._blocks = wp.empty(len(keys), dtype=mat33, device=self.device)
         self._block_keys = keys
-        self._folding = TiedBlocks(mesh, keys) if len(mesh.tied) else None
+        self._folding = TiedBlocks(mesh, keys, self.device) if len(mesh.tied) else None
         if self._folding is not None:
             keys = self._folding.keys
+            self._folded = wp.empty(len(keys), dtype=mat33, device=self.device)
         if len(mesh.beams):
             keys = self._with_beam_blocks(keys)
         block_rows, block_columns = keys % n, keys // n
@@ -284,9 +291,13 @@ class Model:
         of_beams = np.minimum(first, second) * n + np.maximum(first, second)
         f = self._carried_blocks
         of_carried = f.column.astype(np.int64) * n + f.row
-        of_turns = np.unique(mesh.carriers[:, 1::2]).astype(np.int64) * (n + 1)
-        keys = np.unique(np.concatenate([own, of_beams, of_carried, of_turns]))
-        self._beam_places = tuple(np.searchsorted(keys, k) for k in (own, of_beams, of_carried))
+        of_turns = self._carried.turns.astype(np.int64) * (n + 1)
+        added, target = np.unique(np.concatenate([of_beams, of_carried, of_turns]), return_inverse=True)
+        keys = np.union1d(own, added)
+        self._own_places = np.searchsorted(keys, own)
+        # Where those of beams, of carried nodes and of turning sections are added, and which to each.
+        sums = sparse.csr_matrix((np.ones(len(target)), (target, np.arange(len(target)))))
+        self._of_beams = np.searchsorted(keys, added), sums
         self._all_keys = keys
         self._three = (3 * ends[:, :, None].astype(np.int64) + np.arange(3)).reshape(-1, 12)
         return keys
@@ -324,24 +335,19 @@ class Model:
         assert m.beams is not None
         assert self._carried is not None
         found = np.zeros((len(self._all_keys), 3, 3))
-        of_own, of_beams, of_carried = self._beam_places
-        found[of_own] = own
+        found[self._own_places] = own
         stiffness = m.beams.stiffness(self.unknowns_of_beams(u)).reshape(-1, 4, 3, 4, 3)
         a, b = np.tril_indices(4)
         blocks = stiffness[:, a, :, b].transpose(1, 0, 2, 3).reshape(-1, 3, 3)
         blocks = np.where(self._beam_turned[:, None, None], blocks.transpose(0, 2, 1), blocks)
-        np.add.at(found, of_beams, blocks)
         folded = self._carried_blocks(own[self._carrying], self._carried.operators(u))
-        np.add.at(found, of_carried, folded)
         seen = self._seen
         if seen is None or seen[1] != pressure or seen[2] is not m or not np.array_equal(seen[0], u):
             seen = u, pressure, m, self._forces(u, pressure, m)
-        turning, turns = self._carried.turning(u, seen[3], convex)
-        np.add.at(
-            found,
-            np.searchsorted(self._all_keys, turns.astype(np.int64) * (len(self.mesh.nodes) + 1)),
-            turning,
-        )
+        turning = self._carried.turning(u, seen[3], convex)
+        places, sums = self._of_beams
+        added = sums @ np.concatenate([blocks, folded, turning]).reshape(-1, 9)
+        found[places] += added.reshape(-1, 3, 3)
         return found
 
     @cached_property
@@ -483,8 +489,8 @@ class Model:
         """Run one kind of element kernel over every layer; the first to cover an element sets its output."""
         body = [self._u, self._tets, self._gradients, self._dV]
         if self._takes_means:
-            inputs = [*body, self._mean_J, self._mean_slope]
-            self._launch(kernels.mean_dilatation, len(self.mesh.tets), inputs)
+            inputs = [self._acting, *body, self._mean_J, self._mean_slope]
+            self._launch(kernels.mean_dilatation, len(self._acting), inputs)
         for layer in m.layers:
             inputs = [layer.elements, layer.rows, layer.mean_kappa, layer.history, layer.weight, layer.adds]
             inputs += [m.dt_s, *body, self._mean_J, *outputs]
@@ -551,25 +557,20 @@ class Model:
             work -= float(m.beams.energy_mJ(self.unknowns_of_beams(u)).sum())
         return float(self._energy.numpy().sum() - work)
 
-    def _pressures(self, pressure: float) -> list[tuple[float, int, wp.array]]:
-        """Runs of the cavity's faces under one pressure: pressure in MPa, first face, faces (f, 3 | 6)."""
-        return [(pressure, 0, self._faces)] if len(self.mesh.cavity) else []
-
     def _pressure_work(self, pressure: float) -> float:
-        """Pressure in MPa times the volume that it fills, in mJ, at the displacement in `_place`."""
-        return pressure * self._volume()
+        """Work in mJ of a pressure in MPa on the cavity's faces, at the displacement in `_place`."""
+        return pressure * float(self._shares.numpy() @ self._face_volumes())
 
-    def _volume(self) -> float:
-        if len(self.mesh.cavity) == 0:
-            return 0.0
+    def _face_volumes(self) -> Array:
+        """Volume (f,) in mm3 between each of the cavity's faces and the origin, at that displacement."""
         inputs = [self._x, self._faces, *self._face_rule, self._face_volume]
         wp.launch(follower_pressure.enclosed_volume, len(self.mesh.cavity), inputs, device=self.device)
-        return float(self._face_volume.numpy().sum())
+        return np.asarray(self._face_volume.numpy())
 
     def cavity_volume(self, u: Array) -> float:
         """Volume in mm3 that the cavity surface displaced by u (n, 3) in mm and the mirror planes enclose."""
         self._place(u)
-        return self._volume()
+        return float(self._face_volumes().sum())
 
     def smallest_jacobian(self, u: Array, m: MaterialData) -> tuple[float, int]:
         """The smallest det F at any quadrature point at u (n, 3) in mm, and the number of its element."""
@@ -597,9 +598,8 @@ class Model:
         self._place(u)
         self._least_force = m.least_force_N
         self._launch_layers("force", m, [self._mean_slope, self._element_force])
-        for part_MPa, first, faces in self._pressures(pressure):
-            inputs = [part_MPa, self._x, faces, *self._face_rule, first, self._face_force]
-            wp.launch(follower_pressure.pressure_force, len(faces), inputs, device=self.device)
+        inputs = [pressure, self._shares, self._x, self._faces, *self._face_rule, self._face_force]
+        wp.launch(follower_pressure.pressure_force, len(self.mesh.cavity), inputs, device=self.device)
         inputs = [self._parts, *self._node_lists, self._residual]
         wp.launch(kernels.gather_vectors, len(self.mesh.nodes), inputs, device=self.device)
         residual: Array = self._residual.numpy().copy()
@@ -611,6 +611,11 @@ class Model:
         if self.load is not None:
             residual -= self.load
         return residual
+
+    def element_forces(self, u: Array, m: MaterialData) -> Array:
+        """Internal forces (m, k, 3) in N of every element on its nodes, at displacements (n, 3) in mm."""
+        self._forces(u, 0.0, m)
+        return np.asarray(self._element_force.numpy().copy())
 
     def force_scale(self) -> float:
         """Root sum of squares of all element and face forces of the last residual, in N.
@@ -629,11 +634,9 @@ class Model:
         """
         self._place(u)
         self._launch_layers("stiffness", m, [self._mean_slope, self._block_parts])
-        per_face = self.mesh.cavity.shape[1] * (self.mesh.cavity.shape[1] + 1) // 2
-        for part_MPa, first, faces in self._pressures(pressure):
-            inputs = [part_MPa, self._x, faces, *self._face_rule]
-            inputs += [self._element_blocks + first * per_face, self._block_parts]
-            wp.launch(follower_pressure.pressure_stiffness, len(faces), inputs, device=self.device)
+        inputs = [pressure, self._shares, self._x, self._faces, *self._face_rule]
+        inputs += [self._element_blocks, self._block_parts]
+        wp.launch(follower_pressure.pressure_stiffness, len(self.mesh.cavity), inputs, device=self.device)
         values = self._values(u, pressure, m, convex)
         if self.self_contact is None and self.pattern is self._own_pattern:
             return values
@@ -748,7 +751,9 @@ class Model:
             if not own.all():
                 on_beams.append((pairs[~own], added[~own]))
         if self._folding is not None:
-            blocks = self._folding(blocks)
+            inputs = [self._put(blocks, mat33), *self._folding.lists, self._folded]
+            self._launch(kernels.spread_blocks, len(self._folded), inputs)
+            blocks = self._folded.numpy()
         return blocks, on_beams
 
     def matrix(self, values: Array) -> sparse.csc_matrix:

@@ -158,14 +158,13 @@ def _of_pressure(model: Model, u: Array, pressure: float, along: Sequence[Array]
     places, count = model.mesh.nodes + u, len(model.mesh.nodes)
     derivative, shape, rule = (a.numpy() for a in model._face_rule)
     found = np.zeros((len(along), count, 3))
-    for part_MPa, _, faces in model._pressures(pressure):
-        nodes = faces.numpy()
-        s, t = np.einsum("fni,qnk->kfqi", places[nodes], derivative)
-        for k, v in enumerate(along):
-            moved = np.einsum("q,qn,fni->fqi", part_MPa * rule, shape, v[nodes])
-            parts = np.einsum("fqi,qn->fni", np.cross(t, moved), derivative[..., 0])
-            parts += np.einsum("fqi,qn->fni", np.cross(moved, s), derivative[..., 1])
-            np.add.at(found[k], nodes, parts)
+    nodes, share = model.mesh.cavity, pressure * model._shares.numpy()
+    s, t = np.einsum("fni,qnk->kfqi", places[nodes], derivative)
+    for k, v in enumerate(along):
+        moved = np.einsum("f,q,qn,fni->fqi", share, rule, shape, v[nodes])
+        parts = np.einsum("fqi,qn->fni", np.cross(t, moved), derivative[..., 0])
+        parts += np.einsum("fqi,qn->fni", np.cross(moved, s), derivative[..., 1])
+        np.add.at(found[k], nodes, parts)
     return found
 
 

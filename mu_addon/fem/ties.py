@@ -3,10 +3,11 @@
 from __future__ import annotations
 
 import copy
-from functools import cached_property
+from functools import cached_property, partial
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
+import warp as wp
 from scipy import sparse
 
 from ..errors import InputError
@@ -26,10 +27,11 @@ class TiedBlocks:
 
     keys (b,): of the lower triangle's blocks, column n + row of n nodes, row >= column. A node tied to others
     by weights w gives them w times its force, so that its blocks are spread over theirs by products of
-    weights. Attribute keys (c,): of the folded blocks, ascending.
+    weights. device: of Warp. Attribute keys (c,): of the folded blocks, ascending.
     """
 
-    def __init__(self, mesh: Mesh, keys: Array) -> None:
+    def __init__(self, mesh: Mesh, keys: Array, device: str) -> None:
+        self._device = device
         n = len(mesh.nodes)
         free = np.ones(n, bool)
         free[mesh.tied] = False
@@ -57,21 +59,20 @@ class TiedBlocks:
         before, after = np.divmod(place, per_row[columns][block])
         first, second = to.indptr[rows][block] + before, to.indptr[columns][block] + after
         row, column = to.indices[first].astype(np.int64), to.indices[second].astype(np.int64)
-        self._pairs = to.data[first], to.data[second]
         # A block off the diagonal stands for its transpose, too: where both its nodes follow one, both fall
         # on that one's diagonal. One on the diagonal stands for itself, its own other half lies above.
         off = (rows != columns)[block]
         straight, turned = np.flatnonzero(row >= column), np.flatnonzero(off & (row <= column))
-        direct = column[straight] * n + row[straight]
-        transposed = row[turned] * n + column[turned]
-        found = np.unique(np.concatenate([direct, transposed]))
-
-        def spread(chosen: Array, key: Array) -> sparse.csr_matrix:
-            where = np.searchsorted(found, key)
-            return sparse.csr_matrix((chosen, (where, block[chosen])), shape=(len(found), len(keys)))
-
+        found, target = np.unique(
+            np.concatenate([column[straight] * n + row[straight], row[turned] * n + column[turned]]),
+            return_inverse=True,
+        )
+        order = np.argsort(target, kind="stable")
+        chosen = np.concatenate([straight, turned])[order]
         self.keys = found
-        self._places = spread(straight, direct), spread(turned, transposed)
+        self._pairs = to.data[first[chosen]], to.data[second[chosen]]
+        self._start = np.append(0, np.cumsum(np.bincount(target))).astype(np.int32)
+        self._index = np.where(order < len(straight), block[chosen], -block[chosen] - 1)
 
     def _weights_of(self, mesh: Mesh) -> Array:
         return np.concatenate([np.ones(self._own), mesh.tied_weights.ravel()])
@@ -82,12 +83,13 @@ class TiedBlocks:
         Raises InputError, once it is used, where a node follows one that it did not follow before.
         """
         found = copy.copy(self)
-        found.__dict__.pop("_spread", None)
+        found.__dict__.pop("lists", None)
         found.weights = self._weights_of(mesh)
         return found
 
     @cached_property
-    def _spread(self) -> tuple[sparse.csr_matrix, sparse.csr_matrix]:
+    def lists(self) -> tuple[wp.array, wp.array, wp.array]:
+        """On the device, for `kernels.spread_blocks`: start (c + 1,), index (k,) and weight (k,)."""
         left = np.ones(len(self.weights), bool)
         left[self._follows] = False
         if np.abs(self.weights[left]).max(initial=0.0) > NEGLIGIBLE:
@@ -95,14 +97,5 @@ class TiedBlocks:
                 "a relocated body with other ties has no tangent", "mesh", "make a new model of the mesh"
             )
         weight = self.weights[self._pairs[0]] * self.weights[self._pairs[1]]
-        direct, transposed = (
-            sparse.csr_matrix((weight[at.data], at.indices, at.indptr), shape=at.shape) for at in self._places
-        )
-        return direct, transposed
-
-    def __call__(self, blocks: Array) -> Array:
-        """The folded blocks (c, 3, 3) of blocks (b, 3, 3)."""
-        direct, transposed = self._spread
-        across = np.ascontiguousarray(blocks.transpose(0, 2, 1)).reshape(-1, 9)
-        total = direct @ blocks.reshape(-1, 9) + transposed @ across
-        return np.asarray(total).reshape(-1, 3, 3)
+        put = partial(wp.array, device=self._device)
+        return put(self._start, int), put(self._index, int), put(weight, wp.float64)

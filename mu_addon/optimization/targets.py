@@ -25,6 +25,7 @@ from .quantities import (
 )
 from .sensor_quantities import Disturbance, SensorSlope
 from .structure import Quantity
+from .target_kinds import AT, GAP, KINDS, OVER, PRESSURE
 from .unit_quantities import Mass, PrintTime, WallThickness
 
 Goal = Literal["minimise", "maximise"]
@@ -32,9 +33,6 @@ Goal = Literal["minimise", "maximise"]
 _FORM = ("kind", "name", "value", "tolerance", "low", "high", "objective", "points")
 NARROW = 0.02
 """One unit of misfit of a bound without a tolerance, as a share of the bound."""
-HIGHEST_kPa = 500.0
-FARTHEST_WALL_MM = 200.0
-YES_OR_NO = ("walls_apart", "printable")
 
 
 @attrs.frozen
@@ -83,7 +81,7 @@ class Target:
     def words(self) -> str:
         """The target as text."""
         unit = f" {self.unit}" if self.unit else ""
-        if self.kind in YES_OR_NO:
+        if KINDS[self.kind].is_yes:
             return "yes"
         if self.goal is not None:
             return "as small as possible" if self.goal == "minimise" else "as large as possible"
@@ -147,14 +145,14 @@ def _of_printer(printable: Target, supplies: Supplies) -> Target:
 
 def _targets(table: TomlTable, supplies: Supplies) -> list[Target]:
     kind = table.word("kind", tuple(KINDS))
-    table.only((*_FORM, *KINDS[kind].keys))
+    table.only((*_FORM, *KINDS[kind].takes))
     if "points" in table:
         return _curve(table, kind, supplies)
     name = table.word("name", default=_name(kind, table.values))
     if len(name) > 60 or not name.isprintable():
         raise InputError(f"name = {name!r} is not a name", table.at("name"), "write a short text in quotes")
-    quantity, unit = KINDS[kind].made(_Asked(table, kind, name, supplies)), KINDS[kind].unit
-    if kind in YES_OR_NO:
+    quantity, unit = _MADE[kind](_Asked(table, kind, name, supplies)), KINDS[kind].unit
+    if KINDS[kind].is_yes:
         table.without(("value", "tolerance", "low", "high", "objective"), f"{kind} is a yes or a no")
         return [Target(name, kind, unit, quantity, tolerance=1.0, low=1.0, line=table.at())]
     return [Target(name, kind, unit, quantity, **_goal(table, kind), line=table.at())]
@@ -204,7 +202,7 @@ def _curve(table: TomlTable, kind: str, supplies: Supplies) -> list[Target]:
     points = table.take("points", tuple[tuple[float, float], ...])
     if len(points) < 2:
         raise InputError("one point is no curve", table.at("points"), "write [[-15, -20], [30, 40]]")
-    if "pressure_kPa" not in KINDS[kind].keys:
+    if AT not in KINDS[kind].takes:
         raise InputError(f"{kind} has no curve", table.at("points"), "give a value")
     table.without(("value", "low", "high", "objective", "pressure_kPa"), "points give it already")
     rest = {key: v for key, v in table.values.items() if key not in ("points", "name")}
@@ -228,10 +226,10 @@ class _Asked:
 
     def pressure(self, rest: bool = False, default: Any = attrs.NOTHING) -> float:
         """A pressure in kPa. rest: it may be 0."""
-        found = float(self.table.number("pressure_kPa", -HIGHEST_kPa, HIGHEST_kPa, default))
+        found = float(self.table.number(AT, PRESSURE.low, PRESSURE.high, default))
         if found == 0 and not rest:
             raise InputError(
-                f"{self.kind} at 0 kPa is that of the unit at rest", self.table.at("pressure_kPa"),
+                f"{self.kind} at 0 kPa is that of the unit at rest", self.table.at(AT),
                 "give another; with orientation_deg, under its weight, an angle or a tip position may be at "
                 "0",
             )  # fmt: skip
@@ -245,11 +243,11 @@ class _Asked:
     @property
     def pressures(self) -> tuple[float, ...]:
         """Pressures in kPa, without 0."""
-        given, key = self.table.take("pressures_kPa", tuple[float, ...]), "pressures_kPa"
-        bounded = (self.table.bounded(key, p, -HIGHEST_kPa, HIGHEST_kPa) for p in given)
+        given = self.table.take(OVER, tuple[float, ...])
+        bounded = (self.table.bounded(OVER, p, PRESSURE.low, PRESSURE.high) for p in given)
         found = tuple(sorted({*bounded} - {0.0}))
         if not found:
-            raise InputError("no pressure differs from 0", self.table.at(key), "give one")
+            raise InputError("no pressure differs from 0", self.table.at(OVER), "give one")
         return found
 
     @property
@@ -270,44 +268,30 @@ def _tip_force(asked: _Asked) -> TipForce:
             "the wall is on the side toward which pressure bends the unit", asked.table.at("pressure_kPa"),
             "give a pressure above 0",
         )  # fmt: skip
-    return TipForce(asked.name, asked.pressure(), asked.table.number("gap_mm", 0.0, FARTHEST_WALL_MM, 0.0))
+    return TipForce(
+        asked.name, asked.pressure(), asked.table.number(GAP.name, GAP.low, GAP.high, GAP.default)
+    )
 
 
 def _tip_position(asked: _Asked) -> TipPosition:
     return TipPosition(asked.name, asked.bent, asked.table.word("direction", ("y", "z"), "y"))
 
 
-@attrs.frozen
-class Kind:
-    """A kind of target: unit of its value, its keys besides those of every kind, its quantity from these."""
-
-    unit: str
-    keys: tuple[str, ...]
-    made: Callable[[_Asked], Quantity | None]
-
-
-_AT, _AT_SOME = ("pressure_kPa",), ("pressures_kPa", "path")
-KINDS: dict[str, Kind] = {
-    "angle": Kind("deg", _AT, lambda a: Angle(a.name, a.bent)),
-    "tip_force": Kind("N", (*_AT, "gap_mm"), _tip_force),
-    "tip_position": Kind("mm", (*_AT, "direction"), _tip_position),
-    "workspace": Kind("mm", ("pressures_kPa",), lambda a: Workspace(a.name, a.pressures)),
-    "stiffness": Kind(
-        "N/mm", ("direction",),
-        lambda a: RestStiffness(a.name, a.table.word("direction", AXES)),
-    ),
-    "stretch": Kind("", (*_AT, "region"), lambda a: Stretch(a.name, a.pressure(), a.region)),
-    "safety": Kind(
-        "", (*_AT, "region"), lambda a: Stretch(a.name, a.pressure(), a.region, a.supplies.elongation)
-    ),
-    "air_volume": Kind("ml", _AT, lambda a: AirVolume(a.name, a.pressure(rest=True, default=0.0))),
-    "mass": Kind(
-        "g", (), lambda a: Mass(a.name, a.supplies.density_g_per_ml, a.supplies.printer, body=a.supplies.body)
-    ),
-    "print_time": Kind("h", (), lambda a: PrintTime(a.name, a.supplies.printer)),
-    "wall_thickness": Kind("mm", (), lambda a: WallThickness(a.name)),
-    "deviation": Kind("mm", _AT_SOME, lambda a: Disturbance(a.name, a.path, a.pressures)),
-    "sensor_slope": Kind("1/deg", _AT_SOME, lambda a: SensorSlope(a.name, a.path, a.pressures)),
-    "walls_apart": Kind("", _AT, lambda a: WallsApart(a.name, a.pressure())),
-    "printable": Kind("", (), lambda a: None),
-}  # fmt: skip
+_MADE: dict[str, Callable[[_Asked], Quantity | None]] = {
+    "angle": lambda a: Angle(a.name, a.bent),
+    "tip_force": _tip_force,
+    "tip_position": _tip_position,
+    "workspace": lambda a: Workspace(a.name, a.pressures),
+    "stiffness": lambda a: RestStiffness(a.name, a.table.word("direction", AXES)),
+    "stretch": lambda a: Stretch(a.name, a.pressure(), a.region),
+    "safety": lambda a: Stretch(a.name, a.pressure(), a.region, a.supplies.elongation),
+    "air_volume": lambda a: AirVolume(a.name, a.pressure(rest=True, default=0.0)),
+    "mass": lambda a: Mass(a.name, a.supplies.density_g_per_ml, a.supplies.printer, body=a.supplies.body),
+    "print_time": lambda a: PrintTime(a.name, a.supplies.printer),
+    "wall_thickness": lambda a: WallThickness(a.name),
+    "deviation": lambda a: Disturbance(a.name, a.path, a.pressures),
+    "sensor_slope": lambda a: SensorSlope(a.name, a.path, a.pressures),
+    "walls_apart": lambda a: WallsApart(a.name, a.pressure()),
+    "printable": lambda a: None,
+}
+"""The quantity of a target's table, by its kind."""

@@ -9,9 +9,8 @@ import attrs
 import numpy as np
 
 from ..errors import MeshingError
-from ..fem.elementwise import element_forces
+from ..fem.embedding import Probe
 from ..fem.factor import IndefiniteError
-from ..fem.kinematics import Probe
 from ..fem.materials import Materials
 from ..fem.model import MaterialData, Model
 from ..fem.state import State
@@ -179,7 +178,7 @@ def influence_map(
     data = model.parameters(materials)
     found = np.zeros((len(states), len(monitor.nodes), 3, len(mesh.tets)))
     for s, state in enumerate(states):
-        forces = element_forces(model, state.u, data).reshape(len(mesh.tets), -1)
+        forces = model.element_forces(state.u, data).reshape(len(mesh.tets), -1)
         for side in sides:
             free = side.model.free
             loads = probe_loads(mesh, monitor, side.components)

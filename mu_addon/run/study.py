@@ -448,8 +448,8 @@ class Study:
 
     commands: of a study of several, its targets, each with help and example by its name, in order of need.
     They share a folder: each has the inputs and stages of those before it, and a table of its own in the
-    file of inputs; what a further one made stays valid. file: the name of that file, if it is not the study's;
-    version: the number of its format; header: its first line.
+    file of inputs; what a further one made stays valid. file: the name of that file, if it is not that of
+    the study; version: the number of its format; header: its first line.
     """
 
     name: ClassVar[str]

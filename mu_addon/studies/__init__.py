@@ -14,6 +14,7 @@ STUDIES = {
     "check": "Check",
     "design": "UnitStudy",
     "design-experiments": "DesignExperiments",
+    "diagnose": "Diagnose",
     "export": "Export",
     "fit-material": "FitMaterial",
     "grip": "Grip",

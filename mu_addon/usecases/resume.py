@@ -21,7 +21,6 @@ from ..studies.use_case import use_case
 MODULES = {
     "prepare.toml": ".prepare",
     "live.toml": ".live_bending.run",
-    "diagnose.toml": ".diagnose.run",
     "record.toml": ".sensor.record",
     "graph.toml": ".graph.run",
 }

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from mu_addon.evidence.prediction.effective_pressure import first_order_lag
+from mu_addon.evidence.lags import first_order_lag
 from tests.blind import judge, truth, unit_runs
 from tests.blind.judge import CHANGES, IN_SET, judged
 

@@ -144,7 +144,7 @@ class Simulated:
     def __init__(self):
         from scipy.interpolate import BarycentricInterpolator, make_interp_spline
 
-        from mu_addon.evidence.unit_effects import EFFECTS
+        from mu_addon.evidence.effects import STATIC as EFFECTS
 
         self._runs = unit_runs.table()
         pressures = np.array(unit_runs.HIDDEN_kPa)

@@ -13,8 +13,9 @@ import attrs
 import numpy as np
 
 from mu_addon.design.parameters import load_preset
+from mu_addon.evidence.effects import STATIC as EFFECTS
 from mu_addon.evidence.prediction.unit_pressure import UnitResponse, Variant
-from mu_addon.evidence.unit_effects import EFFECTS, Body
+from mu_addon.evidence.unit_body import Body
 from mu_addon.evidence.unit_fem import FINER, Run, run
 from mu_addon.files import read_npz, write_npz
 from mu_addon.meshing.settings import MeshSettings

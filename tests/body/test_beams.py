@@ -30,7 +30,7 @@ SMALL = attrs.evolve(UNIT, chambers=attrs.evolve(UNIT.chambers, count=3))
 
 @pytest.fixture(scope="module")
 def mesh():
-    return mesh_printed(SMALL, MeshSettings(refine=0.6))
+    return mesh_printed(SMALL, MeshSettings(refine=0.4))
 
 
 def random_state(mesh, size=0.02):
@@ -44,7 +44,7 @@ def random_state(mesh, size=0.02):
 def test_beams_bend_a_unit_as_solid_struts_do(mesh):
     """On the same wall, and with as many layers a strut."""
     found = []
-    solid = mesh_printed(SMALL, MeshSettings(refine=0.6), sizes=Sizes(layers=9), solid=True)
+    solid = mesh_printed(SMALL, MeshSettings(refine=0.4), sizes=Sizes(layers=9), solid=True)
     for body in (mesh, solid):
         solver = Equilibrium(Model(body, threads=1), materials_of(SMALL, body))
         state = solver.reach(0.005, [solver.at_zero_pressure()])
@@ -113,9 +113,8 @@ def test_sections_pressed_from_both_sides_stay_definite_where_asked(mesh):
     carried = Carried(mesh)
     slope = np.zeros_like(mesh.nodes)
     slope[mesh.carried] = mesh.nodes[mesh.carried] - mesh.nodes[mesh.carriers[:, 0]]
-    exact, turns = carried.turning(u, slope)
-    convex, same = carried.turning(u, slope, convex=True)
-    assert (same == turns).all()
+    exact = carried.turning(u, slope)
+    convex = carried.turning(u, slope, convex=True)
     before, after = np.linalg.eigvalsh(exact), np.linalg.eigvalsh(convex)
     assert (before.min(axis=1) < 0).any()
     np.testing.assert_allclose(after, np.maximum(before, 0.0), atol=1e-12 * np.abs(before).max())

@@ -5,12 +5,35 @@ from pathlib import Path
 import numpy as np
 from scipy.optimize import least_squares
 
+from mu_addon.evidence.camera import View
+from mu_addon.evidence.chamber import Chamber
+from mu_addon.evidence.effects import Acting, laws_of
+from mu_addon.evidence.effects.declaration import Setting
 from mu_addon.measured import Experiment
 
 
 def experiment(kind, columns, name="made", **fields):
     n = len(next(iter(columns.values())))
     return Experiment(name, kind, "fit", Path("made.csv"), columns, np.arange(n), "", **fields)
+
+
+def acted(kind, quantity, values, *places, **setting):
+    """A quantity after what acts on it at places of a kind, with values by "effect.parameter"."""
+    return Acting(kind, values, Setting(**setting)).along(quantity, *places)
+
+
+def read_by_camera(channels, y, time, scale, values):
+    """Channels as a camera with faults reads them."""
+    return acted("unit_pressure", View(), values, "view", time_s=time).read(channels, y, scale)
+
+
+def held(time, initial_kPa, compliance_per_kPa=0.0, **values):
+    """Pressures in a chamber with its valve shut, with values by name of an effect's parameter."""
+    keys = {p.name: f"{n}.{p.name}" for n, laws in laws_of("pressure_hold").items() for w in laws
+            for p in w.parameters}  # fmt: skip
+    values = {keys[name]: value for name, value in values.items()}
+    chamber = acted("pressure_hold", Chamber(initial_kPa, compliance_per_kPa), values, "gas")
+    return chamber.pressure_kPa(time)
 
 
 def measured(simulator, planned, values, noise=0.0, seed=0):

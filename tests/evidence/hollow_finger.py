@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from mu_addon.design.parameters import load_preset
-from mu_addon.evidence import unit_effects
+from mu_addon.evidence import unit_body
 from mu_addon.meshing.mesh import LATTICE, MEMBRANE, boundary_faces, mirror
 from tests.fem.bodies import _grid, make
 
@@ -74,6 +74,6 @@ def in_place_of_units(made=finger):
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr("mu_addon.body.printed_mesh.mesh_printed", made)
         patch.setattr("mu_addon.evidence.unit_fem.mesh_printed", made)
-        unit_effects._mesh_kept.cache_clear()
+        unit_body._mesh_kept.cache_clear()
         yield
-    unit_effects._mesh_kept.cache_clear()
+    unit_body._mesh_kept.cache_clear()

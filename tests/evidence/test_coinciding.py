@@ -4,19 +4,19 @@ import attrs
 import numpy as np
 
 from mu_addon.evidence.diagnosis import diagnose
-from mu_addon.evidence.effect import FORCE_SCALE
+from mu_addon.evidence.effect import FORCE_SCALE, offered
+from mu_addon.evidence.effects.declaration import Data
+from mu_addon.evidence.effects.gravity import DENSITY
+from mu_addon.evidence.effects.rate_independent_hysteresis import _borne_by_one
+from mu_addon.evidence.effects.self_heating import strain_rate
 from mu_addon.evidence.fit import Fitter
 from mu_addon.evidence.found_causes import Selection
 from mu_addon.evidence.noise import Source
-from mu_addon.evidence.owned import coincident_effects, owned_effects, strain_rate
+from mu_addon.evidence.owned import coincident_effects, owned_effects
 from mu_addon.evidence.plausibility import value_at_a_bound
 from mu_addon.evidence.pooled import pooled_effects
-from mu_addon.evidence.prediction.beam_deadweight import EFFECTS as BEAM
 from mu_addon.evidence.prediction.bench import bench_simulators
-from mu_addon.evidence.prediction.drift import zeroed
 from mu_addon.evidence.prediction.pressure_hold import ChamberPressure
-from mu_addon.evidence.prediction.unit_pressure import TIMED
-from mu_addon.evidence.prediction.yielding import _borne_by_one
 from mu_addon.evidence.record import record
 from mu_addon.evidence.rivals import causes_of, with_promising_rivals
 from mu_addon.evidence.simulator import Composite
@@ -169,14 +169,15 @@ def test_a_height_scales_the_strain_of_its_specimen_alone():
 
 def test_a_gauge_is_not_off_by_a_fifth_of_what_it_reads():
     made = [experiment("pressure_hold", {"time_s": T, "pressure_kPa": 35.0 + 0.0 * T})]
-    (offset,) = (e for e in zeroed(TIMED, "pressure_hold", made) if e.name == "pressure_offset")
+    (offset,) = (
+        e for e in offered(Data(kind="pressure_hold", experiments=made)) if e.name == "pressure_offset"
+    )
     assert (offset.parameters[0].low, offset.parameters[0].high) == (-3.5, 3.5)
 
 
 def test_a_density_that_no_resin_has_is_no_cause():
-    weight = next(e for e in BEAM if e.name == "gravity").parameters[0]
-    assert value_at_a_bound(weight, 3710.0)
-    assert not value_at_a_bound(weight, 1070.0)
+    assert value_at_a_bound(DENSITY, 3710.0)
+    assert not value_at_a_bound(DENSITY, 1070.0)
 
 
 def test_gas_warms_with_its_room_as_logged_or_as_fitted():

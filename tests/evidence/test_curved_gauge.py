@@ -8,12 +8,12 @@ import pytest
 
 from mu_addon.evidence.diagnosis import diagnose
 from mu_addon.evidence.effect import readable
-from mu_addon.evidence.prediction.instruments import as_read, before_the_gauge
+from mu_addon.evidence.instrument_curve import curved
 from mu_addon.evidence.prediction.unit_pressure import UnitPressure
 from mu_addon.evidence.sensitivity import best_seen
 from mu_addon.evidence.simulator import Composite
 from mu_addon.usecases.diagnose.words import sentence
-from tests.evidence import analytic
+from tests.evidence import analytic, bench
 
 RANGE_kPa = 40.0
 
@@ -51,9 +51,10 @@ def test_a_curved_gauge_is_straight_at_rest_and_at_its_range_and_undone_in_betwe
             "pressure_gain.gain": 0.02,
             "pressure_offset.offset_kPa": 0.3,
         }
-        read = as_read(p, values, RANGE_kPa)
-        assert before_the_gauge(read, values, RANGE_kPa) == pytest.approx(p, abs=1e-9)
-        alone = as_read(np.array([0.0, 20.0, 40.0]), {"pressure_nonlinearity.bow": bow}, RANGE_kPa)
+        read = curved(p, bow, RANGE_kPa) * 1.02 + 0.3
+        undone = bench.acted("unit_pose", read, values, "zero", "gain", "curve", largest=RANGE_kPa)
+        assert undone == pytest.approx(p, abs=1e-9)
+        alone = curved(np.array([0.0, 20.0, 40.0]), bow, RANGE_kPa)
         assert alone == pytest.approx([0.0, 20.0 + bow * RANGE_kPa, 40.0])
 
 

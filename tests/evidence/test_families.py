@@ -11,16 +11,13 @@ import pytest
 from benchmarks.evidence.second_code.judging import simulator_of
 from benchmarks.evidence.second_code.recording import write
 from benchmarks.evidence.second_code.sets import made, order
+from mu_addon.evidence.chamber import ROOM_K, ATMOSPHERE_kPa
 from mu_addon.evidence.diagnosis import diagnose
 from mu_addon.evidence.effect import Parameter
 from mu_addon.evidence.plausibility import value_at_a_bound
-from mu_addon.evidence.prediction.effective_pressure import in_the_chambers
 from mu_addon.evidence.prediction.instants import finer
-from mu_addon.evidence.prediction.instruments import filtered
-from mu_addon.evidence.prediction.pressure_hold import ROOM_K, ATMOSPHERE_kPa, chamber_pressure
 from mu_addon.evidence.prediction.pressure_step import PressureStep
 from mu_addon.evidence.prediction.waveguide_bending import WaveguideVoltage
-from mu_addon.evidence.prediction.yielding import yielded
 from mu_addon.evidence.ringing import swinging
 from mu_addon.measured import read_folder
 from mu_addon.usecases.diagnose.words import sentence
@@ -44,11 +41,15 @@ def test_two_volumes_of_a_line_fill_one_after_the_other():
     found = solve_ivp(rates, (0.0, 3.0), [0.0, 0.0], t_eval=t, rtol=1e-9, atol=1e-9, max_step=0.01).y[1]
     slow, fast = sorted(-1.0 / np.linalg.eigvals([[-(1 + between / second) / first, between / second / first],
                                                   [1 / second, -1 / second]]), reverse=True)  # fmt: skip
+
+    def in_the_chambers(values):
+        return bench.acted("unit_pressure", p, values, "leak", "line", time_s=t, fed=1.0)
+
     values = {"line_lag.slower_s": slow, "line_lag.faster_share": fast / slow}
-    np.testing.assert_allclose(in_the_chambers(t, p, values), found, atol=1e-6)
+    np.testing.assert_allclose(in_the_chambers(values), found, atol=1e-6)
     # Without a second volume it is the first law.
-    alone = in_the_chambers(t, p, {"line_lag.slower_s": 0.2, "line_lag.faster_share": 0.0})
-    np.testing.assert_allclose(alone, in_the_chambers(t, p, {"line_lag.time_s": 0.2}), atol=1e-12)
+    alone = in_the_chambers({"line_lag.slower_s": 0.2, "line_lag.faster_share": 0.0})
+    np.testing.assert_allclose(alone, in_the_chambers({"line_lag.time_s": 0.2}), atol=1e-12)
 
 
 def test_one_element_yields_as_wen_has_it():
@@ -65,6 +66,9 @@ def test_one_element_yields_as_wen_has_it():
     def law(e):
         return 900.0 * e + 2000.0 * e**3
 
+    def yielded(values):
+        return bench.acted("coupon", law(way), values, "yielding", law=law, path=way)
+
     z, borne = 0.0, [0.0]
     for before, now in pairwise(way):
         sign = np.sign(now - before)
@@ -79,9 +83,9 @@ def test_one_element_yields_as_wen_has_it():
         )
         borne.append(z)
     np.testing.assert_allclose(
-        yielded(way, law, values), 0.6 * law(way) + 0.4 * 900.0 * np.array(borne) / 25.0, atol=0.02
+        yielded(values), 0.6 * law(way) + 0.4 * 900.0 * np.array(borne) / 25.0, atol=0.02
     )
-    assert yielded(way, law, {}) == pytest.approx(law(way))
+    assert yielded({}) == pytest.approx(law(way))
 
 
 @pytest.mark.parametrize("damping", [0.71, 0.87, 0.999])
@@ -93,13 +97,13 @@ def test_a_filter_of_two_poles_is_that_of_its_transfer_function(damping):
     w = 2.0 * np.pi / 0.8
     _, found, _ = lsim(TransferFunction([w * w], [1.0, 2.0 * damping * w, w * w]), force, t)
     values = {"force_lag.period_s": 0.8, "force_lag.damping": damping}
-    np.testing.assert_allclose(filtered(t, force, values), found, atol=1e-9)
+    np.testing.assert_allclose(bench.acted("coupon", force, values, "filter", time_s=t), found, atol=1e-9)
 
 
 def test_a_leak_that_ends_leaves_the_pressure_that_it_had_then():
     t = np.linspace(0.0, 200.0, 401)
-    whole = chamber_pressure(t, 150.0, loss_per_s=2e-3)
-    found = chamber_pressure(t, 150.0, loss_until_tight_per_s=2e-3, tight_s=80.0)
+    whole = bench.held(t, 150.0, loss_per_s=2e-3)
+    found = bench.held(t, 150.0, loss_until_tight_per_s=2e-3, tight_s=80.0)
     np.testing.assert_allclose(found[t < 78], whole[t < 78], atol=1e-3)
     np.testing.assert_allclose(found[t > 82], whole[t == 80.0][0], atol=2e-3)
 
@@ -107,22 +111,22 @@ def test_a_leak_that_ends_leaves_the_pressure_that_it_had_then():
 def test_a_valve_that_opens_lets_out_what_is_above():
     """Gas at rest in temperature and volume: above the opening pressure it falls as exp, below it stays."""
     t = np.linspace(0.0, 300.0, 301)
-    found = chamber_pressure(t, 180.0, loss_above_per_s=0.01, opens_kPa=100.0)
+    found = bench.held(t, 180.0, loss_above_per_s=0.01, opens_kPa=100.0)
     np.testing.assert_allclose(found, 100.0 + 80.0 * np.exp(-0.01 * t), atol=1e-4)
-    np.testing.assert_allclose(chamber_pressure(t, 90.0, loss_above_per_s=0.01, opens_kPa=100.0), 90.0)
+    np.testing.assert_allclose(bench.held(t, 90.0, loss_above_per_s=0.01, opens_kPa=100.0), 90.0)
 
 
 def test_a_chamber_creeps_as_a_power_of_time():
     """Gas that keeps its temperature: p V stays, with the volume that Findley's law has."""
     t = np.linspace(0.0, 300.0, 301)
-    p = chamber_pressure(t, 200.0, findley_per_kPa=1e-4, findley_power=0.3)
+    p = bench.held(t, 200.0, findley_per_MPa=0.1, findley_power=0.3)
     volume = 1.0 + 1e-4 * p * (t / 100.0) ** 0.3
     np.testing.assert_allclose((p + ATMOSPHERE_kPa) * volume, 200.0 + ATMOSPHERE_kPa, rtol=1e-6)
 
 
 def test_gas_cools_to_the_wall_and_with_the_wall():
     t = np.linspace(0.0, 400.0, 401)
-    p = chamber_pressure(t, 100.0, cooling_per_kPa=0.05, rates=(10.0, 0.3, 6.0))
+    p = bench.held(t, 100.0, cooling_K_per_100_kPa=5.0, first_s=10.0, later_share=0.3, later_times=6.0)
     warm = 5.0 * (0.7 * np.exp(-t / 10.0) + 0.3 * np.exp(-t / 60.0))
     expected = (100.0 + ATMOSPHERE_kPa) * (ROOM_K + warm) / (ROOM_K + 5.0) - ATMOSPHERE_kPa
     np.testing.assert_allclose(p, expected, atol=1e-6)

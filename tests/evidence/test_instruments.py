@@ -10,12 +10,11 @@ from mu_addon.evidence.diagnosis import diagnose
 from mu_addon.evidence.fit import Fitter
 from mu_addon.evidence.noise import Source
 from mu_addon.evidence.prediction.bench import bench_simulators
-from mu_addon.evidence.prediction.camera import read_by_camera
 from mu_addon.evidence.prediction.coupon import CouponStress
 from mu_addon.evidence.record import record
 from mu_addon.evidence.simulator import Composite
 from tests.evidence import analytic
-from tests.evidence.bench import experiment
+from tests.evidence.bench import experiment, read_by_camera
 
 CLOCK = np.arange(0.0, 400.0, 1.0)
 

@@ -9,11 +9,11 @@ from benchmarks.evidence.second_code.recording import write
 from benchmarks.evidence.second_code.sets import Order, made
 from mu_addon.evidence.acceptance import of_the_law
 from mu_addon.evidence.diagnosis import diagnose
+from mu_addon.evidence.effects.mullins_softening import turns
+from mu_addon.evidence.effects.viscoelasticity import spread_lag
 from mu_addon.evidence.found_causes import LAW
+from mu_addon.evidence.lags import first_order_lag
 from mu_addon.evidence.prediction.coupon import CouponStress
-from mu_addon.evidence.prediction.effective_pressure import first_order_lag, spread_lag
-from mu_addon.evidence.prediction.specimen import turns
-from mu_addon.evidence.simulator import Composite
 from mu_addon.measured import read_folder
 from tests.evidence import bench
 
@@ -39,9 +39,8 @@ def test_a_lag_on_an_uneven_clock_is_the_solution_from_sample_to_sample(time_s):
 def test_times_that_spread_over_no_decade_are_one_time():
     t = np.linspace(0.0, 30.0, 200)
     p = np.sin(t)
-    values = {"viscoelasticity.middle_s": 3.0, "viscoelasticity.decades": 0.0}
-    np.testing.assert_allclose(spread_lag(t, p, values), first_order_lag(t, p, 3.0), atol=1e-12)
-    wide = spread_lag(t, p, {**values, "viscoelasticity.decades": 2.0})
+    np.testing.assert_allclose(spread_lag(t, p, 3.0, 0.0), first_order_lag(t, p, 3.0), atol=1e-12)
+    wide = spread_lag(t, p, 3.0, 2.0)
     each = [first_order_lag(t, p, 3.0 * 10.0**k) for k in np.linspace(-1.0, 1.0, 7)]
     np.testing.assert_allclose(wide, np.mean(each, axis=0), atol=1e-12)
 
@@ -98,23 +97,6 @@ def test_softening_knows_the_largest_strain_though_no_sample_was_there():
     rows = slice(0, None, 50)
     coarse, whole = (CouponStress([e]).predict(e, values)[0] for e in map(made_of, (rows, slice(None))))
     np.testing.assert_allclose(coarse, whole[rows], rtol=1e-6, atol=1e-9)
-
-
-def test_a_law_that_refines_is_offered_apart():
-    e = bench.experiment(
-        "coupon", {"time_s": np.arange(9.0), "strain": np.linspace(0, 0.1, 9), "stress_kPa": np.ones(9)}
-    )
-    simulator = Composite({"coupon": CouponStress([e])})
-    assert {r.name for r in simulator.refinements} == {
-        "force_drift",
-        "frame_compliance",
-        "force_lag",
-        "rate_independent_hysteresis",
-        "viscoelasticity",
-        "mullins_softening",
-        "strain_stiffening",
-    }
-    assert not any(effect.refines for effect in simulator.effects)
 
 
 @pytest.mark.parametrize(

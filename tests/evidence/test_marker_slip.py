@@ -9,11 +9,13 @@ from scipy.integrate import trapezoid
 
 from mu_addon.evidence.diagnosis import diagnose
 from mu_addon.evidence.effect import SLIP
+from mu_addon.evidence.effect import offered as laws
+from mu_addon.evidence.effects.declaration import Data
+from mu_addon.evidence.effects.marker_slip import Recordings, searched
 from mu_addon.evidence.extended import extended_model
 from mu_addon.evidence.hypotheses import by_search
-from mu_addon.evidence.prediction.marker_slip import Recordings, searched, slip_effects, slipped
 from mu_addon.usecases.diagnose.words import sentence, to_do
-from tests.evidence import analytic
+from tests.evidence import analytic, bench
 
 DT = 0.4
 SHARE = 0.37
@@ -184,6 +186,11 @@ def test_before_its_moment_a_slip_shows_nothing_and_after_it_all():
     np.testing.assert_allclose(records.share(fine, moment + DT / 2)[::4], later, atol=1e-9)
 
 
+def slipped(channels, y, rest, experiment, recordings, values):
+    setting = {"channels": channels, "rest": rest, "experiment": experiment, "recordings": recordings}
+    return bench.acted("unit_pressure", y, values, "surface", **setting)
+
+
 def test_a_slip_of_nothing_leaves_every_reading_as_it_is():
     made = folder(10)
     y = np.arange(7.0 * len(made[0])).reshape(7, -1)
@@ -214,7 +221,8 @@ def without(experiments, *columns):
 
 
 def offered(experiments, channels=analytic.CHANNELS):
-    return slip_effects(channels, "unit_pressure", Recordings(experiments))
+    data = Data(kind="unit_pressure", experiments=experiments, channels=channels)
+    return [e for e in laws(data) if e.name == SLIP]
 
 
 def test_one_marker_alone_or_an_angle_alone_cannot_be_told_from_a_camera_that_moved():

@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 
 from mu_addon.evidence.diagnosis import diagnose
-from mu_addon.evidence.prediction.camera import read_by_camera
 from tests.evidence import analytic
+from tests.evidence.bench import read_by_camera
 
 HALF_mm = 37.5
 PLACE = ("marker1_y_mm", "marker1_z_mm")

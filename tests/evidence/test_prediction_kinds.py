@@ -14,7 +14,7 @@ from mu_addon.evidence.prediction.pressure_step import PressureStep
 from mu_addon.evidence.prediction.unit_pose import STATIONS, UnitPose, between_stations
 from mu_addon.evidence.prediction.unit_pressure import UnitResponse, Variant
 from mu_addon.evidence.ringing import swinging
-from mu_addon.evidence.unit_effects import Body
+from mu_addon.evidence.unit_body import Body
 from mu_addon.evidence.unit_run import Run, run
 from mu_addon.fem.equilibrium import Equilibrium
 from mu_addon.fem.held_tip import HeldTip

@@ -7,9 +7,10 @@ from scipy.interpolate import CubicSpline
 
 from mu_addon.design.parameters import load_preset
 from mu_addon.evidence.diagnosis import diagnose
+from mu_addon.evidence.effects import STATIC as EFFECTS
 from mu_addon.evidence.prediction.unit_pressure import UnitPressure
 from mu_addon.evidence.simulator import Composite
-from mu_addon.evidence.unit_effects import EFFECTS, Body
+from mu_addon.evidence.unit_body import Body
 from mu_addon.evidence.unit_fem import Run, UnitSettings, run, unit_responses
 from mu_addon.fem.dead_loads import STANDARD_GRAVITY
 from mu_addon.fem.laws import Foam, Layered, NeoHooke, Yeoh

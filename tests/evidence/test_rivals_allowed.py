@@ -5,14 +5,13 @@ import pytest
 
 from mu_addon.evidence.diagnosis import diagnose
 from mu_addon.evidence.drive import denoised_drives
-from mu_addon.evidence.effects import acted
 from mu_addon.evidence.found_causes import RIVAL_DELTA_CHI2, not_distinguished
 from mu_addon.evidence.prediction import coupon
 from mu_addon.evidence.prediction.bench import bench_simulators
 from mu_addon.evidence.simulator import Composite
 from mu_addon.usecases.diagnose.words import advice, sentence, to_do
 from tests.evidence import analytic
-from tests.evidence.bench import experiment
+from tests.evidence.bench import acted, experiment
 from tests.evidence.test_coinciding import titles
 
 SECTION, LENGTH = (6.0, 2.0), 40.0
@@ -89,12 +88,15 @@ def test_blocks_of_other_moduli_are_no_change_between_two_tests(moduli):
 def test_a_supply_gives_no_more_and_no_faster():
     t = np.array([0.0, 1.0, 2.0, 4.0, 5.0])
     p = np.array([0.0, 10.0, 30.0, 30.0, -30.0])
-    e = experiment("unit_pressure", {"time_s": t, "pressure_kPa": p}, "asked")
-    limited = acted("pressure", e, p, {"supply_limit.short_kPa": 6.0}, 30.0)
+
+    def given(values):
+        return acted("unit_pressure", p, values, "supply", time_s=t, largest=30.0)
+
+    limited = given({"supply_limit.short_kPa": 6.0})
     np.testing.assert_allclose(limited, [0.0, 10.0, 24.0, 24.0, -24.0])
-    slow = acted("pressure", e, p, {"supply_rate_limit.slowness_s_kPa": 0.1}, 30.0)
+    slow = given({"supply_rate_limit.slowness_s_kPa": 0.1})
     np.testing.assert_allclose(slow, [0.0, 10.0, 20.0, 30.0, 20.0])
-    assert acted("pressure", e, p, {"supply_limit.short_kPa": 0.0}, 30.0) is p
+    assert given({"supply_limit.short_kPa": 0.0}) is p
 
 
 def test_a_supply_that_ends_below_its_command_is_no_softening():
@@ -135,6 +137,9 @@ def test_corners_of_a_few_rows_are_no_noise_of_the_drive():
     assert again is None
 
 
+@pytest.mark.nightly(
+    "tests/evidence/test_laws.py::test_two_effects_that_pass_for_slow_noise_one_by_one_are_found_together"
+)
 def test_two_causes_of_which_one_alternates_by_test_are_both_found():
     """Neither predicts a test left out alone: the search ended at the first."""
     rng = np.random.default_rng(8)

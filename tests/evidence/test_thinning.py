@@ -8,7 +8,6 @@ import pytest
 from mu_addon.errors import InputError
 from mu_addon.evidence.diagnosis import diagnose
 from mu_addon.evidence.prediction.bench import bench_simulators
-from mu_addon.evidence.prediction.pressure_hold import chamber_pressure
 from mu_addon.evidence.simulator import Composite
 from mu_addon.evidence.thinning import MOST, thinned
 from mu_addon.measured import table
@@ -92,7 +91,7 @@ def test_a_leak_in_long_records_has_an_interval_as_their_noise_allows():
             "pressure_hold",
             {
                 "time_s": t,
-                "pressure_kPa": chamber_pressure(t, p, loss_per_s=4e-5) + rng.normal(0, 0.3, len(t)),
+                "pressure_kPa": bench.held(t, p, loss_per_s=4e-5) + rng.normal(0, 0.3, len(t)),
             },
             name=f"hold {p:g}",
         )

@@ -11,9 +11,11 @@ from scipy.interpolate import CubicSpline
 
 from mu_addon.errors import ConvergenceError, InputError
 from mu_addon.evidence import unit_fem
+from mu_addon.evidence.effects import ON_UNITS
+from mu_addon.evidence.effects import STATIC as EFFECTS
 from mu_addon.evidence.markers import attached, material_points, nearest
 from mu_addon.evidence.prediction.unit_pressure import UnitPressure
-from mu_addon.evidence.unit_effects import EFFECTS, Body, down
+from mu_addon.evidence.unit_body import Body, down
 from mu_addon.evidence.unit_fem import (
     Result,
     Run,
@@ -248,7 +250,7 @@ def test_what_cannot_be_computed_is_left_out_and_said(monkeypatch):
     e = EFFECTS["wall_thickness"]
     # A wall of 9 mm has no room in a bladder of 12.5 mm.
     broken = attrs.evolve(e, parameter=attrs.evolve(e.parameter, high=20.0), sizes=(0.9, 1.0, 10.0))
-    monkeypatch.setitem(EFFECTS, "wall_thickness", broken)
+    monkeypatch.setitem(ON_UNITS, "wall_thickness", broken)
     quick = attrs.evolve(QUICK, effects=("wall_thickness",))
     with pytest.warns(UnitResponseWarning, match="wall_thickness = 10 at 1x is left out"):
         (r,) = unit_responses(UNIT, [bench(markers={})], quick)
@@ -257,7 +259,7 @@ def test_what_cannot_be_computed_is_left_out_and_said(monkeypatch):
     (effect,) = (e for e in UnitPressure([r]).effects if e.name == "wall_thickness")
     assert effect.parameters[0].low < 0.9
     assert effect.parameters[0].high == 1.0
-    monkeypatch.setitem(EFFECTS, "wall_thickness", attrs.evolve(broken, sizes=(1.0, 10.0)))
+    monkeypatch.setitem(ON_UNITS, "wall_thickness", attrs.evolve(broken, sizes=(1.0, 10.0)))
     with pytest.warns(UnitResponseWarning):
         (r,) = unit_responses(UNIT, [bench(markers={})], quick)
     assert not r.variants
@@ -500,7 +502,7 @@ def test_a_first_look_runs_few_sizes_and_a_name_asks_for_the_others():
     assert further is not None
     assert further.whole == {"wall_thickness"}
     assert further.further(("wall_thickness",)) is None
-    assert attrs.evolve(plan, whole=further.whole).sizes(EFFECTS["wall_thickness"]) == (
+    assert attrs.evolve(plan, whole=further.whole).sizes("wall_thickness") == (
         0.8,
         0.9,
         1.0,

@@ -6,7 +6,7 @@ from hypothesis import example, given, settings
 from hypothesis import strategies as st
 
 from mu_addon.errors import InputError
-from mu_addon.evidence.prediction.effective_pressure import first_order_lag, play_operator
+from mu_addon.evidence.lags import first_order_lag, play_operator
 from mu_addon.evidence.prediction.unit_pressure import UnitPressure, cycles, pressure_histories
 from tests.evidence import analytic
 

@@ -6,10 +6,12 @@ import pytest
 from scipy.interpolate import CubicSpline
 
 from mu_addon.evidence.diagnosis import diagnose
-from mu_addon.evidence.prediction.flat_obstacle import contact_effect
+from mu_addon.evidence.effect import offered
+from mu_addon.evidence.effects.contact import with_flat_obstacle
+from mu_addon.evidence.effects.declaration import Data
 from mu_addon.evidence.prediction.unit_pressure import UnitPressure
 from mu_addon.evidence.simulator import Composite
-from mu_addon.evidence.unit_effects import Body, with_flat_obstacle
+from mu_addon.evidence.unit_body import Body
 from mu_addon.evidence.unit_fem import Run, UnitSettings, run, unit_responses
 from mu_addon.fem.equilibrium import Equilibrium
 from mu_addon.fem.newton_settings import CONTACT_NEWTON
@@ -86,7 +88,8 @@ def test_walls_nearer_than_those_computed_are_not_guessed(walls):
     whole = max(walls, key=lambda r: r.scale)
     wall = whole.walls[1]
     fewer = attrs.evolve(wall, reaches_mm=wall.reaches_mm[:-1], changes=wall.changes[:-1])
-    (size,) = contact_effect([(1, fewer), (-1, whole.walls[-1])], "unit_pressure").parameters
+    data = Data(kind="unit_pressure", walls=((1, fewer), (-1, whole.walls[-1])))
+    (size,) = next(e for e in offered(data) if e.name == "contact").parameters
     assert size.high == wall.reaches_mm[-2]
     assert size.low == -whole.walls[-1].reaches_mm[-1]
 

@@ -42,15 +42,3 @@ def inner_stretch(pressure, inner, outer, mu, kappa, turns):
     if not found.success:
         raise ArithmeticError(found.message)
     return float(found.y[0, 0] / inner)
-
-
-def incompressible_pressure(stretch, largest, inner, outer, slope):
-    """Pressure in MPa that holds an incompressible sphere at a hoop stretch inside, after a larger one.
-
-    slope(now, largest) = dW/da in MPa along the equibiaxial stretch a, of arrays: p is the integral of
-    slope / (a^2 R) over R, with a^3 = 1 + (a_inner^3 - 1)(A/R)^3.
-    """
-    points, weights = np.polynomial.legendre.leggauss(60)
-    R = inner + (outer - inner) * (points + 1) / 2
-    now, most = (np.cbrt(1 + (s**3 - 1) * (inner / R) ** 3) for s in (stretch, largest))
-    return float((slope(now, most) / (now**2 * R) * weights).sum() * (outer - inner) / 2)

@@ -9,8 +9,8 @@ import pytest
 from mu_addon.body.printed_mesh import mesh_printed
 from mu_addon.design.parameters import load_preset
 from mu_addon.errors import InputError
-from mu_addon.evidence import unit_effects
-from mu_addon.evidence.unit_effects import Body
+from mu_addon.evidence import unit_body
+from mu_addon.evidence.unit_body import Body
 from mu_addon.evidence.unit_run import Run, run
 from mu_addon.fem.beam_fibres import Mixture, fibres_of
 from mu_addon.fem.beams import Beams, frames_along, sections_of
@@ -129,7 +129,7 @@ def test_a_unit_of_beams_changes_by_a_law_as_one_of_solid_struts_does(effect, si
     unit = attrs.evolve(unit, chambers=attrs.evolve(unit.chambers, count=3))
     changes = []
     for solid in (False, True):
-        monkeypatch.setattr(unit_effects, "_mesh_kept", partial(mesh_printed, solid=solid))
+        monkeypatch.setattr(unit_body, "_mesh_kept", partial(mesh_printed, solid=solid))
         body = Body(unit, MeshSettings(refine=0.6))
         plain, changed = (
             run(Run(body, (0.0, 10.0, 20.0, 30.0), effect=name, size=value)).values[0]

@@ -3,15 +3,12 @@
 import numpy as np
 import pytest
 from scipy.optimize import brentq
-from scipy.special import erf
 
 from mu_addon.fem.equilibrium import Equilibrium
-from mu_addon.fem.laws import OgdenRoxburgh, Prony, Yeoh
 from mu_addon.fem.model import Model
 from mu_addon.fem.newton_settings import NewtonSettings
 
-from . import bodies, cases, thick
-from .radial import incompressible_pressure, inner_stretch
+from . import bodies, cases
 
 MU, KAPPA = 1.0, 4.0
 E, NU = 9 * KAPPA * MU / (3 * KAPPA + MU), (3 * KAPPA - 2 * MU) / (6 * KAPPA + 2 * MU)
@@ -72,16 +69,6 @@ def test_simple_shear(order):
 
 
 @pytest.mark.parametrize(
-    ("turns", "pressure", "stretch"),
-    [(2, thick.sphere_pressure(1.3), 1.3), (1, thick.tube_pressure(1.3), 1.3)],
-)
-def test_radial_equation_tends_to_the_incompressible_closed_form(turns, pressure, stretch):
-    off = [inner_stretch(pressure, 10, 12, 1.0, kappa, turns) - stretch for kappa in (1e2, 1e3)]
-    assert 0 < off[1] < 2e-3
-    assert off[0] / off[1] == pytest.approx(10, rel=0.1)
-
-
-@pytest.mark.parametrize(
     ("name", "order", "sizes", "bound", "rate"),
     [
         ("sphere 0.45", 1, (4, 8), 0.045, 1.3),
@@ -106,46 +93,3 @@ def test_known_answer(name, order, sizes, bound, rate):
     assert errors[1] < bound
     if rate is not None:
         assert np.log2(errors[0] / errors[1]) > rate
-
-
-YEOH = (0.3, -0.02, 0.004)
-
-
-def yeoh(stretch):
-    """Energy of the Yeoh law at an incompressible equibiaxial stretch, and its derivative."""
-    x, slope = 2 * stretch**2 + stretch**-4 - 3, 4 * stretch - 4 * stretch**-5
-    c1, c2, c3 = YEOH
-    return c1 * x + c2 * x**2 + c3 * x**3, (c1 + 2 * c2 * x + 3 * c3 * x**2) * slope
-
-
-def test_a_sphere_under_falling_pressure_relaxes_in_place():
-    """Under p (1 + sum of beta e^(-t/tau)) incompressible walls stay where p alone holds their Yeoh law."""
-    beta, tau = np.array([0.5, 0.3]), np.array([1.0, 10.0])
-    pressure = incompressible_pressure(1.15, 1.15, 10, 12, lambda now, _: yeoh(now)[1])
-    time = np.array([0.0, 0.0, 0.5, 2.0, 8.0, 40.0])
-    held = pressure * (1 + (beta * np.exp(-time[:, None] / tau)).sum(axis=1)) * (np.arange(6) > 0)
-    drift = []
-    for kappa in (200.0, 2000.0):
-        row = (*YEOH, kappa, beta[0], tau[0], beta[1], tau[1], 0.0, 1.0)
-        elastic = thick.sphere_in_time((*YEOH, kappa), Yeoh, [0.0, 1.0], [0.0, pressure])[-1]
-        found = thick.sphere_in_time(row, Prony, time, held)[1:]
-        drift.append(np.abs(found / elastic - 1).max())
-    # What compressibility alone leaves: volume change does not relax.
-    assert drift[1] < 5e-4
-    assert drift[1] < 0.12 * drift[0]
-
-
-def test_a_softened_sphere_comes_back_along_its_closed_form():
-    """Blown up to 1.25, let down to 1.1, blown up beyond: eta = 1 - erf((W_m - W)/(m + beta W_m))/r."""
-    r, m, beta = 1.6, 0.02, 0.1
-
-    def slope(now, largest):
-        (energy, rise), (most, _) = yeoh(now), yeoh(largest)
-        return rise * (1 - erf((most - energy) / (m + beta * most)) / r)
-
-    course = [(1.0, 1.0), (1.25, 1.25), (1.1, 1.25), (1.2, 1.25), (1.3, 1.3)]
-    pressure = [incompressible_pressure(now, largest, 10, 12, slope) for now, largest in course]
-    virgin = incompressible_pressure(1.1, 1.1, 10, 12, slope)
-    assert pressure[2] < 0.9 * virgin
-    found = thick.sphere_in_time((*YEOH, 600.0, r, m, beta), OgdenRoxburgh, np.arange(5.0), pressure)
-    np.testing.assert_allclose(found / 10, [now - 1 for now, _ in course], rtol=5e-3, atol=1e-9)

@@ -8,7 +8,6 @@ from mu_addon.fem.equilibrium import Equilibrium
 from mu_addon.fem.model import Model
 from mu_addon.fem.newton_settings import NewtonSettings
 from mu_addon.fem.state import rest
-from mu_addon.fem.time_stepping import simulate_in_time
 
 from . import bodies
 from .radial import inner_stretch
@@ -59,17 +58,6 @@ def tube(around, order, poisson, **options):
     u = _radial_growth(mesh, model, tube_pressure(), poisson)
     inside = np.unique(mesh.cavity)
     return np.linalg.norm((mesh.nodes + u)[inside, :2], axis=1).mean() - INNER, len(model.free)
-
-
-def sphere_in_time(row, law, time_s, pressure_MPa, around=4):
-    """Mean radial displacements (k,) in mm of the inner surface of a thick sphere at k instants."""
-    mesh = bodies.sphere_octant(INNER, OUTER, around)
-    equilibrium = Equilibrium(
-        Model(mesh), bodies.everywhere(mesh, law, *row), NewtonSettings(max_step_MPa=0.05)
-    )
-    states = simulate_in_time(equilibrium, time_s, 1e3 * np.asarray(pressure_MPa)).states
-    inside = np.unique(mesh.cavity)
-    return np.array([np.linalg.norm((mesh.nodes + s.u)[inside], axis=1).mean() - INNER for s in states])
 
 
 def radial_growth(pressure, poisson, turns):

@@ -51,7 +51,8 @@ class Layout:
         if isinstance(value, float):
             value = f"{value:.6g}"
         elif not isinstance(value, str | int | bool):
-            value = [f"{v:.6g}" if isinstance(v, float) else v for v in value]
+            several = sorted(value) if isinstance(value, set) else value
+            value = [f"{v:.6g}" if isinstance(v, float) else v for v in several]
         self.say("field", f"{data.bl_rna.properties[name].name if text is None else text}: {value}")
 
     def prop_search(self, data, name, *_, **more):

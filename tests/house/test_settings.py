@@ -40,7 +40,7 @@ OTHERWISE = {
     "evidence/parameter.py": {"experiment"},  # that shows an effect
     "evidence/prediction/specimen.py": {"strain"},
     "evidence/prediction/unit_pressure.py": {"orientation_deg"},
-    "evidence/unit_effects.py": {"self_contact", "orientation_deg", "device"},  # the plain unit, on the CPU
+    "evidence/unit_body.py": {"self_contact", "orientation_deg", "device"},  # the plain unit, on the CPU
     "measured/experiment.py": {"orientation_deg", "specimen"},
     "optimization/unit_body.py": {"self_contact"},
     "placement/search.py": {"batch"},  # of paths

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from mu_addon.design.parameters import load_preset
-from mu_addon.evidence.unit_effects import Body
+from mu_addon.evidence.unit_body import Body
 from mu_addon.evidence.unit_run import Run, run
 from mu_addon.fem.held_tip import STIFFNESS
 from mu_addon.meshing.settings import MeshSettings

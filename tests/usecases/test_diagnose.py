@@ -3,7 +3,6 @@
 import csv
 import json
 import re
-import shutil
 from pathlib import Path
 from types import SimpleNamespace
 
@@ -13,7 +12,6 @@ import pytest
 
 from mu_addon.cli.main import main
 from mu_addon.design.parameters import load_preset
-from mu_addon.errors import InputError
 from mu_addon.evidence import unit_fem
 from mu_addon.evidence.drive import denoised_drives
 from mu_addon.evidence.effect import Parameter, bare
@@ -25,15 +23,15 @@ from mu_addon.evidence.simulator import Composite
 from mu_addon.evidence.simulators import simulations_plan
 from mu_addon.evidence.unit_fem import UnitSettings
 from mu_addon.measured import read_folder
-from mu_addon.run.context import RunContext, run_to_end
+from mu_addon.run.context import run_to_end
 from mu_addon.run.folder import keep_inputs
 from mu_addon.run.progress import Progress
+from mu_addon.run.usecase import UseCase
 from mu_addon.studies.design_experiments import DesignExperiments
-from mu_addon.usecases.diagnose import run as diagnosing
-from mu_addon.usecases.diagnose.job import Job, read_job
-from mu_addon.usecases.diagnose.remedies import what_to_do
-from mu_addon.usecases.diagnose.run import USE_CASE, console_summary
-from mu_addon.usecases.diagnose.words import alternatives
+from mu_addon.studies.diagnose import Diagnose
+from mu_addon.studies.use_case import use_case
+from mu_addon.usecases.diagnose import judged_data
+from mu_addon.usecases.diagnose.words import alternatives, what_to_do
 from mu_addon.usecases.graph.definitions import definitions
 from mu_addon.usecases.simulate_and_place.extended_unit import read_extended
 from tests.evidence import analytic
@@ -48,11 +46,12 @@ OFFSET_mm = 0.09
 ALL_SIZES = {"settings": UnitSettings(changes=None, whole=None)}
 
 
-def run(folder, out, *arguments, **options):
+def run(folder, out, unit=None, **options):
     messages = []
     progress = Progress([messages.append])
     with run_to_end(progress) as context:
-        USE_CASE.start(Job(read_folder(folder), *arguments, **options), out, context)
+        study = Diagnose(data=read_folder(folder), unit=unit, **options).complete()
+        use_case("diagnose").start(study, out, context)
     return context, messages
 
 
@@ -108,54 +107,6 @@ def test_the_report_says_it_in_a_sentence_and_needs_no_server(overcured):
     assert "<script" not in html
 
 
-def test_the_terminal_is_told_in_a_few_lines(overcured):
-    lines = console_summary(overcured[2])
-    assert lines[0] == "verdict: named: overcure"
-    assert lines[-1].startswith("next: ")
-    assert 3 <= len(lines) <= 6
-
-
-def test_every_stage_is_told(overcured):
-    stages = [m["stage"] for m in overcured[3] if m["type"] == "progress" and m["state"] == "start"]
-    assert stages[:3] == ["noise", "sensitivities", "effects"]
-    assert stages[-2:] == ["gain", "report"]
-    ended = [m["stage"] for m in overcured[3] if m["type"] == "progress" and m["state"] == "end"]
-    assert ended == stages
-
-
-def test_equal_data_leave_equal_bytes(overcured, tmp_path):
-    folder, out, _, _ = overcured
-    run(folder, tmp_path)
-    for name in ("verdict.json", "model.toml", "residuals.csv", "report.html", "diagnose.toml"):
-        assert (tmp_path / name).read_bytes() == (out / name).read_bytes()
-
-
-def test_the_same_data_are_not_judged_twice(overcured, tmp_path, monkeypatch):
-    folder, out, summary, _ = overcured
-    shutil.copytree(out, tmp_path / "out")
-    monkeypatch.setattr(diagnosing, "diagnose", None)
-    context, messages = run(folder, tmp_path / "out")
-    assert context.status == 0
-    assert console_summary(context.summary) == console_summary(summary)
-    assert json.loads((tmp_path / "out" / "summary.json").read_text())["status"] == "complete"
-    assert [m["stage"] for m in messages if m["type"] == "progress" and m["state"] == "end"] == [
-        "verdict of the same data, from the cache"
-    ]
-    # A result that is gone is made again.
-    (tmp_path / "out" / "report.html").unlink()
-    assert run(folder, tmp_path / "out")[0].status != 0
-
-
-def test_other_data_set_the_old_results_aside(overcured, tmp_path):
-    _, out, _, _ = overcured
-    shutil.copytree(out, tmp_path / "out")
-    other = weighed_blocks(tmp_path / "data", 0.0)
-    context, _ = run(other, tmp_path / "out")
-    assert context.status == 0
-    assert (tmp_path / "out" / "stale" / "verdict.json").read_bytes() == (out / "verdict.json").read_bytes()
-    assert json.loads((tmp_path / "out" / "verdict.json").read_text())["verdict"] == "none"
-
-
 def test_nothing_is_named_where_nothing_is_wrong(tmp_path):
     context, _ = run(weighed_blocks(tmp_path / "data", 0.0), tmp_path / "out")
     assert context.summary["verdict"] == "none"
@@ -205,9 +156,9 @@ def test_a_unit_is_judged_by_its_angle_and_markers(request, tmp_path, gauge_kPa)
     first = summary["first_look"]
     assert "clogged" not in first["headline"]
     stages = [m["stage"] for m in messages if m["type"] == "progress" and m["state"] == "start"]
-    (told,) = (i for i, stage in enumerate(stages) if stage.startswith("first look"))
-    assert first["headline"] in stages[told]
-    assert stages.index("unit") < told < stages.index("unit with each effect")
+    assert stages[:3] == ["unit", "first look", "unit with each effect"]
+    (finding,) = (m["what"] for m in messages if m["type"] == "finding")
+    assert first["headline"] in finding
     remarks = [r.partition(" was averaged")[0] for r in summary["remarks"] if "was averaged" in r]
     # What is predicted has noise as well, of which nothing is taken.
     assert len(remarks) == (gauge_kPa > 0)
@@ -236,7 +187,7 @@ def test_a_gauge_s_noise_is_averaged_out_and_remarked_on(tmp_path, gauge_kPa):
     """Of what is predicted, which has noise as well, nothing is taken."""
     measured = read_folder(bent_unit(tmp_path, {}, gauge_kPa=gauge_kPa))
     freed, _ = denoised_drives(measured.experiments, analytic.simulator(measured.experiments))
-    remarks = diagnosing._noisy_gauges(measured, SimpleNamespace(experiments=freed))
+    remarks = judged_data._noisy_gauges(measured.experiments, SimpleNamespace(experiments=freed))
     said = [re.match(r"the noise of pressure_kPa, up to ([0-9.]+), was averaged", r) for r in remarks]
     # The largest of the records' estimates.
     assert [float(m[1]) for m in said] == pytest.approx([gauge_kPa] * (gauge_kPa > 0), rel=0.15)
@@ -249,32 +200,6 @@ def test_a_gauge_s_noise_is_averaged_out_and_remarked_on(tmp_path, gauge_kPa):
     assert changed == ({"pressure_kPa"} if gauge_kPa else set())
 
 
-@pytest.mark.parametrize(
-    ("spoil", "what", "where"),
-    [
-        (lambda f: (f / "block_1.csv").write_text("strain,stress_kPa\n0,0\n0.1,x\n"), "x", "row 3"),
-        (lambda f: (f / "block_1.csv").unlink(), "cannot read block_1.csv", "experiments.toml"),
-        (lambda f: (f / "experiments.toml").unlink(), "cannot read experiments.toml", ""),
-        (
-            lambda f: (f / "experiments.toml").write_text(
-                (f / "experiments.toml").read_text().replace('"fit"', '"held_out"')
-            ),
-            "every experiment is held out",
-            "experiments.toml",
-        ),
-    ],
-)
-def test_what_cannot_be_judged_is_named_before_anything_is_written(tmp_path, spoil, what, where):
-    folder = weighed_blocks(tmp_path / "data", 0.0)
-    spoil(folder)
-    progress = Progress()
-    with pytest.raises(InputError) as caught:
-        USE_CASE.start(Job(read_folder(folder)), tmp_path / "out", RunContext(progress))
-    assert what in caught.value.what
-    assert where in f"{caught.value.where} {caught.value.remedy}"
-    assert not (tmp_path / "out").exists()
-
-
 RELAXES = {"viscoelasticity.share": 0.25, "viscoelasticity.time_s": 4.0}
 
 
@@ -284,24 +209,11 @@ def analytic_unit(monkeypatch):
     monkeypatch.setattr(unit_fem, "unit_responses", lambda *_, **__: [analytic.response()])
 
 
-def test_a_diagnosis_goes_on_with_walls_that_touch_as_it_began(tmp_path):
-    measured = read_folder(ROOT / "assets" / "examples" / "paper-bending")
-    jobs = [Job(measured, self_contact=apart) for apart in (False, True)]
-    assert [job.unit_settings.self_contact for job in jobs] == [False, True]
-    assert jobs[0].texts()["diagnose.toml"] != jobs[1].texts()["diagnose.toml"]
-    for job in jobs:
-        for name, text in job.texts().items():
-            (tmp_path / name).write_text(text)
-        again = read_job(tmp_path)
-        assert again.self_contact == job.self_contact
-        assert again.texts() == job.texts()
-
-
 def test_every_face_keeps_walls_apart(tmp_path, monkeypatch):
     folder = ROOT / "assets" / "examples" / "paper-bending"
     measured = read_folder(folder)
-    started = [Job(measured), DesignExperiments(data=measured)]
-    monkeypatch.setattr(type(USE_CASE), "start", lambda _, job, *__: started.append(job))
+    started = [Diagnose(data=measured), DesignExperiments(data=measured)]
+    monkeypatch.setattr(UseCase, "start", lambda _, job, *__: started.append(job))
     for command in ("diagnose", "design-experiments"):
         main([command, str(folder), "--out", str(tmp_path / "out")])
     assert all(job.self_contact for job in started)
@@ -310,14 +222,6 @@ def test_every_face_keeps_walls_apart(tmp_path, monkeypatch):
     assert not started[-1].self_contact
     node = definitions()["diagnose"]
     assert {s.name: s.description.default for s in node.settings} == {"self_contact": True}
-    assert [Job(measured, self_contact=apart).body for apart in (True, False)] == [
-        "the unit as printed, walls kept apart",
-        "the unit as printed, walls may cross",
-    ]
-    # Of blocks nothing is said: their cells are computed either way.
-    blocks = Job(read_folder(PAPER))
-    assert "self_contact" not in blocks.texts()["diagnose.toml"]
-    assert not blocks.body
 
 
 def test_a_unit_of_softer_resin_is_trusted_with_its_own_moduli(tmp_path, analytic_unit):
@@ -353,8 +257,8 @@ def test_a_diagnosis_goes_on_with_what_it_knew(tmp_path, overcured):
     blocks, out, _, _ = overcured
     known = load_model(out / "model.toml")
     assert known.effects
-    keep_inputs(tmp_path / "two", Job(read_folder(blocks), known=known).texts())
-    assert read_job(tmp_path / "two").known == known
+    keep_inputs(tmp_path / "two", Diagnose(data=read_folder(blocks), known=known).texts())
+    assert Diagnose.read(tmp_path / "two").known == known
 
 
 def test_a_softening_is_stated_with_the_pressure_it_is_relative_to():
@@ -364,7 +268,7 @@ def test_a_softening_is_stated_with_the_pressure_it_is_relative_to():
     name, time, pressure, how = analytic.protocols(0.4, 1)[0]
     e = analytic.experiment(name, time, pressure, dict.fromkeys(analytic.CHANNELS, 0.0 * time), **how)
     simulators = {"unit_pressure": UnitPressure([analytic.response()], [e])}
-    stated = diagnosing.with_reference(model, simulators)
+    stated = judged_data.with_reference(model, simulators)
     reference = stated.effects["mullins_softening"]["reference_kPa"].value
     assert reference == np.abs(analytic.response().pressures_kPa).max()
     elsewhere = attrs.evolve(analytic.response(), pressures_kPa=2.0 * analytic.response().pressures_kPa)

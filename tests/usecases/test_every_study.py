@@ -21,6 +21,7 @@ LINES = {
     "calibrate": COMMANDS["calibrate"].words,
     "check": "check --stl part.stl",
     "design-experiments": COMMANDS["design-experiments"].words,
+    "diagnose": COMMANDS["diagnose"].words,
     "export": "export --unit unit.toml --formats stl txt --quality interactive",
     "fit-material": "fit-material tests/data/treloar --laws yeoh",
 }

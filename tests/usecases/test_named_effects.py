@@ -16,9 +16,10 @@ from mu_addon.design.body import body_of
 from mu_addon.design.parameters import load_preset, to_toml
 from mu_addon.design.rigid_body import RigidBody
 from mu_addon.errors import InputError
+from mu_addon.evidence.effects import STATIC as EFFECTS
 from mu_addon.evidence.extended import ExtendedModel, Fitted
 from mu_addon.evidence.prediction.unit_pressure import UnitPressure
-from mu_addon.evidence.unit_effects import EFFECTS, Body
+from mu_addon.evidence.unit_body import Body
 from mu_addon.fem.bending_angle import bending_angle_deg
 from mu_addon.fem.clogged import CloggedModel
 from mu_addon.fem.equilibrium import Equilibrium
@@ -251,13 +252,13 @@ GRAVITY = "[simulate.effects.gravity]\ndensity_kg_m3 = 1300.0\n"
 @pytest.mark.parametrize(
     ("old", "new", "what", "remedy"),
     [
-        ("gravity", "magnetism", "no effect 'magnetism' is known", "known: gravity, strain"),
-        ("gravity", "gravitty", "did you mean 'gravity'", "known: gravity"),
+        ("gravity", "magnetism", "no effect 'magnetism' is known", "known: anisotropy, clogged"),
+        ("gravity", "gravitty", "did you mean 'gravity'", "known: anisotropy"),
         (
             "gravity",
             "pressure_gain",
             "not an effect that a simulation of the unit can contain",
-            "known: gravity",
+            "known: anisotropy",
         ),
         ("density", "mass", "gravity has density_kg_m3, not mass_kg_m3", "write density_kg_m3"),
         ("1300.0", "-5.0", "density_kg_m3 = -5.0 is out of bounds", "give 0 to 4000 kg/m3"),

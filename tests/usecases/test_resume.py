@@ -26,6 +26,7 @@ from mu_addon.studies import STUDIES
 from mu_addon.studies.chain import Chain
 from mu_addon.studies.check import Check, read_part
 from mu_addon.studies.design_experiments import DesignExperiments
+from mu_addon.studies.diagnose import Diagnose
 from mu_addon.studies.export import Export, TakeOff
 from mu_addon.studies.fit_material import FitMaterial
 from mu_addon.studies.grip import Grip
@@ -35,7 +36,6 @@ from mu_addon.studies.optimize import Optimize
 from mu_addon.studies.specimens import Specimens
 from mu_addon.studies.sweep import Sweep
 from mu_addon.usecases import prepare
-from mu_addon.usecases.diagnose import job as diagnose
 from mu_addon.usecases.graph import job as graph
 from mu_addon.usecases.graph.templates import template
 from mu_addon.usecases.live_bending import requests as live_bending
@@ -104,8 +104,8 @@ def jobs(folder):
     yield lattice(load_preset("mu-1.5x"), None, friction="none")
     hand = load_gripper("gripper")
     yield Grip(gripper=hand, cubes_mm=(10.0,), density_g_per_ml=1 / 3, friction=0.3, refine=0.45, coarse=True)
-    yield diagnose.Job(paper)
-    yield diagnose.Job(paper, load_preset("mu-1.5x"))
+    yield Diagnose(data=paper).complete()
+    yield Diagnose(data=paper, unit=load_preset("mu-1.5x"))
     yield DesignExperiments(data=paper, noise={**NOISE, "angle": 1 / 3})
     yield FitMaterial(data=measured, laws=("yeoh", "neo-hooke"), hold_out=("uniaxial",), weights="relative")
     yield Sweep(plan=attrs.evolve(parse_plan(sweep, folder), counts=(4, 6)), workers=2)
@@ -150,7 +150,7 @@ def test_measured_data_that_are_gone_or_others_are_named(tmp_path):
 def test_an_older_diagnosis_says_how_to_go_on(tmp_path):
     keep_inputs(
         tmp_path,
-        {"diagnose.toml": f'{diagnose.LAYOUT.header}\nformat = 1\nexperiments_sha256 = "0"\n\n[data]\n'},
+        {"diagnose.toml": f'{Diagnose.layout().header}\nformat = 1\nexperiments_sha256 = "0"\n\n[data]\n'},
     )
     with pytest.raises(InputError, match="does not name the place of the folder of measured data") as caught:
         resume(tmp_path, RunContext(Progress()))

@@ -205,7 +205,7 @@ def test_sensor_paths_are_ranked_in_a_wall_that_remembers(tmp_path):
 
 def test_jobs_that_know_no_such_wall_refuse_it():
     from mu_addon.design.gripper import load_gripper
-    from mu_addon.evidence.unit_effects import Body
+    from mu_addon.evidence.unit_body import Body
     from mu_addon.fem.equilibrium import Equilibrium
     from mu_addon.fem.model import Model
     from mu_addon.fem.trajectory import simulate

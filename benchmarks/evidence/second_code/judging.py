@@ -26,8 +26,8 @@ from mu_addon.evidence.verdict import Verdict
 from mu_addon.measured import Experiment, read_folder
 from mu_addon.run.context import run_to_end
 from mu_addon.run.progress import Progress, terminal
-from mu_addon.usecases.diagnose.job import Job
-from mu_addon.usecases.diagnose.run import USE_CASE
+from mu_addon.studies.diagnose import Diagnose
+from mu_addon.studies.use_case import use_case
 
 from .recording import write
 from .sets import Order, made, noise_of
@@ -167,7 +167,8 @@ def outcome(truth: Sequence[str], verdict: Verdict) -> str:
 def verdict_on(folder: Path, unit: Path, out: Path) -> dict[str, Any]:
     """The program's verdict on a folder, in one folder for all sets: its simulations are kept there."""
     with run_to_end(Progress([terminal(sys.stderr)])) as context:
-        USE_CASE.start(Job(read_folder(folder), read_unit(unit)), out, context)
+        study = Diagnose(data=read_folder(folder), unit=read_unit(unit)).complete()
+        use_case("diagnose").start(study, out, context)
     if context.status:
         raise SystemExit(context.status)
     return dict(json.loads((out / "verdict.json").read_text()))

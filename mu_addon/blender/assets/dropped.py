@@ -10,15 +10,14 @@ so a timer then applies their parameters to the unit, in one undo step, and remo
 from typing import Any
 
 import bpy
-from bpy.app.handlers import persistent
 from bpy.props import StringProperty
 
 from ...errors import InputError
 from ...reading import parse_json
 from ..preview import materials
-from ..shared import displays
+from ..shared import displays, restoring, viewports
 from ..shared.operators import linked, reports_errors
-from ..shared.registration import add_handlers, remove_handlers
+from ..shared.registration import handler, timer
 from ..unit import drawing, resins
 from ..unit import object as unit_object
 
@@ -29,7 +28,6 @@ RESIN, PRINTER = "mu_resin", "mu_printer"
 class MU_OT_take_asset(bpy.types.Operator):
     """Give a unit the resin or printer that was dropped on it"""
 
-    bl_idname = "mu.take_asset"
     bl_label = "Use Dropped Asset"
     bl_options = {"REGISTER", "UNDO", "INTERNAL"}
 
@@ -117,60 +115,24 @@ def take() -> None:
         bpy.ops.mu.take_asset("EXEC_DEFAULT", True, unit=unit, asset=asset)
 
 
+@timer()
 def _later() -> None:
-    windows = bpy.context.window_manager.windows
-    with bpy.context.temp_override(window=windows[0]) if windows else bpy.context.temp_override():
+    with viewports.in_window():
         take()
 
 
-_restoring = False
-"""True during undo or redo: restored assets were dropped before."""
-
-
-@persistent
-def _begin_restoring(*_: Any) -> None:
-    global _restoring
-    _restoring = True
-
-
-@persistent
+@handler("undo_post", "redo_post")
 def _restored(*_: Any) -> None:
     """Remove a drop that undo restored before it was applied: the drop itself is undone, too."""
-    global _restoring
     while (found := waiting()) is not None:
         root, box = unit_object.by_uuid(found[0]), bpy.context.scene.objects.get(found[1])
         if box is not None and box.get(PRINTER):
             _remove(box)
         else:
             _restore_slots(root)
-    _restoring = False
 
 
-@persistent
+@handler("depsgraph_update_post")
 def _updated(*_: Any) -> None:
-    if _restoring:
-        return
-    if waiting() is not None and not bpy.app.timers.is_registered(_later):
-        bpy.app.timers.register(_later, first_interval=0.0)
-
-
-_HANDLERS = {
-    "depsgraph_update_post": _updated,
-    **dict.fromkeys(("undo_pre", "redo_pre"), _begin_restoring),
-    **dict.fromkeys(("undo_post", "redo_post"), _restored),
-}
-_register, _unregister = bpy.utils.register_classes_factory((MU_OT_take_asset,))
-
-
-def register() -> None:
-    """Register the operator, and handlers that look for drops."""
-    _register()
-    add_handlers(_HANDLERS)
-
-
-def unregister() -> None:
-    """Unregister them."""
-    remove_handlers(_HANDLERS)
-    if bpy.app.timers.is_registered(_later):
-        bpy.app.timers.unregister(_later)
-    _unregister()
+    if not restoring.now() and waiting() is not None:
+        _later.soon()

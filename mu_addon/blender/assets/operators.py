@@ -6,42 +6,29 @@ import bpy
 from bpy.props import EnumProperty
 
 from ..preview import nodes
-from ..shared.operators import reports_errors
-from . import library, sample
+from ..shared.operators import FreeOperator, operator
+from . import library
+from . import sample as sample_scenes
 
 
-class MU_OT_assets(bpy.types.Operator):
+@operator(FreeOperator, "Add to Asset Browser", undo=False)
+def assets(operator):
     """Put presets, resins, printers and node groups into the asset browser: a library in your own folder"""
-
-    bl_idname = "mu.assets"
-    bl_label = "Add to Asset Browser"
-    bl_options = {"REGISTER"}
-
-    @reports_errors
-    def execute(self, context):
-        folder = library.add()
-        self.report(
-            {"INFO"}, f"Presets, resins, printers and node groups are in the library {library.NAME}: {folder}"
-        )
-        return {"FINISHED"}
+    folder = library.add()
+    operator.report(
+        {"INFO"}, f"Presets, resins, printers and node groups are in the library {library.NAME}: {folder}"
+    )
 
 
-class MU_OT_assets_remove(bpy.types.Operator):
+@operator(FreeOperator, "Remove from Asset Browser", undo=False)
+def assets_remove():
     """Remove this extension's assets from the asset browser; files that use them keep theirs"""
-
-    bl_idname = "mu.assets_remove"
-    bl_label = "Remove from Asset Browser"
-    bl_options = {"REGISTER"}
-
-    def execute(self, context):
-        library.remove()
-        return {"FINISHED"}
+    library.remove()
 
 
 class MU_OT_skin(bpy.types.Operator):
     """Give the active curve or mesh a node group: tubes, a waveguide with wells, balls"""
 
-    bl_idname = "mu.skin"
     bl_label = "Skin with Nodes"
     bl_options = {"REGISTER", "UNDO"}
 
@@ -64,26 +51,15 @@ class MU_OT_skin(bpy.types.Operator):
         return {"FINISHED"}
 
 
-class MU_OT_sample(bpy.types.Operator):
-    """Add a sample scene: an overview, or the start of one task"""
-
-    bl_idname = "mu.sample"
-    bl_label = "Sample Scene"
-    bl_options = {"REGISTER", "UNDO"}
-
-    scene: EnumProperty(
+@operator(
+    FreeOperator,
+    "Sample Scene",
+    scene=EnumProperty(
         name="Scene",
         description="What is added",
-        items=[(name, name.capitalize(), text) for name, (text, _) in sample.SCENES.items()],
-    )
-
-    @reports_errors
-    def execute(self, context):
-        sample.build(context, self.scene)
-        return {"FINISHED"}
-
-
-CLASSES = (MU_OT_assets, MU_OT_assets_remove, MU_OT_skin, MU_OT_sample)
-
-
-register, unregister = bpy.utils.register_classes_factory(CLASSES)
+        items=[(name, name.capitalize(), text) for name, (text, _) in sample_scenes.SCENES.items()],
+    ),
+)
+def sample(context, scene):
+    """Add a sample scene: an overview, or the start of one task"""
+    sample_scenes.build(context, scene)

@@ -10,16 +10,14 @@ import numpy as np
 
 from ...design.assets import asset_names
 from ...design.printing.printer import load_printer
-from ..preview import materials
+from ..preview import materials, skeletons
 from ..shared import scene_units
+from ..unit.envelope import arrays_in
 from ..unit.resins import parameters as resin_parameters
 from .dropped import PRINTER, RESIN
 from .surface_picture import surface_pixels
 
 Array = np.ndarray[Any, Any]
-
-_CORNERS = np.array([(x, y, z) for x in (-0.5, 0.5) for y in (-0.5, 0.5) for z in (0.0, 1.0)])
-_FACES = ((0, 1, 3, 2), (4, 6, 7, 5), (0, 4, 5, 1), (2, 3, 7, 6), (0, 2, 6, 4), (1, 5, 7, 3))
 
 
 def names_of_all() -> set[str]:
@@ -56,7 +54,8 @@ def printers() -> list[Any]:
         printer = load_printer(name)
         size = np.array([printer[f"build_{axis}_mm"] for axis in "xyz"])
         mesh = bpy.data.meshes.new(printer.title)
-        mesh.from_pydata((_CORNERS * size).tolist(), [], _FACES)
+        half = 0.5 * size * [1.0, 1.0, 0.0]
+        skeletons.write(mesh, skeletons.box(-half, half + size * [0.0, 0.0, 1.0]))
         box = bpy.data.objects.new(printer.title, mesh)
         box.scale = (scene_units.mm(bpy.context.scene),) * 3
         box.display_type = "WIRE"
@@ -70,19 +69,11 @@ def printers() -> list[Any]:
 def pixels_of(made: Any, size: int) -> Array:
     """Pixels (size, size, 4): a ball of a resin, a printer's build volume; rows from below."""
     if isinstance(made, bpy.types.Material):
-        points, triangles = _ball()
-        colour = made.diffuse_color[:3]
+        mesh, colour = bpy.data.meshes.new("ball"), made.diffuse_color[:3]
+        skeletons.write(mesh, skeletons.ball(1.0, 32))
+        points, triangles = arrays_in(mesh)
+        bpy.data.meshes.remove(mesh)
     else:
-        points = np.array([vertex.co[:] for vertex in made.data.vertices])
-        quads = np.array(_FACES)
-        triangles = np.concatenate([quads[:, :3], quads[:, [0, 2, 3]]])
+        points, triangles = arrays_in(made.data)
         colour = materials.COLOURS["MU Layer"][:3]
     return surface_pixels(points, triangles, np.broadcast_to(colour, (len(triangles), 3)), size)
-
-
-def _ball() -> tuple[Array, Array]:
-    turn, rise = np.meshgrid(np.linspace(0, 2 * np.pi, 33), np.linspace(-np.pi / 2, np.pi / 2, 17))
-    points = np.stack([np.cos(rise) * np.cos(turn), np.cos(rise) * np.sin(turn), np.sin(rise)], axis=-1)
-    first = (np.arange(16)[:, None] * 33 + np.arange(32)).ravel()
-    triangles = [np.stack([first, first + 1, first + 34]), np.stack([first, first + 34, first + 33])]
-    return points.reshape(-1, 3), np.concatenate(triangles, axis=1).T

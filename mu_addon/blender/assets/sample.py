@@ -45,10 +45,7 @@ def _overview(context: Any) -> list[Any]:
     bpy.ops.mu.path(name="alpha4")
 
     body = _barrel(context, bodied)
-    for other in context.selected_objects:
-        other.select_set(False)
-    body.select_set(True)
-    context.view_layer.objects.active = bodied
+    viewports.select(context, [body], bodied)
     context.view_layer.update()
     bpy.ops.mu.body()
     # Beside the units, which are placed beside objects at the cursor.

@@ -7,6 +7,7 @@ import bpy
 from ...design.body import require_sound
 from ...design.printing.repair import repaired
 from ...errors import InputError
+from ..shared.operators import operator
 from ..shared.wording import sentence
 from ..unit import envelope
 from ..unit import object as unit_object
@@ -45,9 +46,7 @@ def report_flaws(operator, root, found, sound):
 class MU_OT_body_check(UnitOperator, bpy.types.Operator):
     """Check the selected mesh for open edges, self-intersections, size and fit; mark the places"""
 
-    bl_idname = "mu.body_check"
     bl_label = "Check Body"
-    bl_options = {"REGISTER", "UNDO"}
 
     def act(self, context, root):
         body = bodies.of_object(selected_mesh(context), root)
@@ -55,59 +54,38 @@ class MU_OT_body_check(UnitOperator, bpy.types.Operator):
         report_flaws(self, root, found, f"{body.name} can be an envelope: {len(body.triangles)} triangles")
 
 
-class MU_OT_body_repair(UnitOperator, bpy.types.Operator):
+@operator(UnitOperator, "Repair Copy")
+def body_repair(operator, context, root):
     """Repair a copy of the selected mesh where there is only one way: flipped or doubled faces, tiny gaps"""
-
-    bl_idname = "mu.body_repair"
-    bl_label = "Repair Copy"
-    bl_options = {"REGISTER", "UNDO"}
-
-    def act(self, context, root):
-        obj = selected_mesh(context)
-        mended = repaired(*bodies.arrays_of(obj, root))
-        if not mended.is_whole:
-            remains = "; ".join(mended.remains)
-            raise InputError(f"only by hand: {remains}", obj.name, "Check Body marks the places")
-        if not mended.changes:
-            self.report({"INFO"}, f"{obj.name} needs no repair")
-            return {"CANCELLED"}
-        bodies.put_repaired(obj, root, mended)
-        for line in mended.lines():
-            self.report({"WARNING"}, sentence(line))
-        return {"FINISHED"}
+    obj = selected_mesh(context)
+    mended = repaired(*bodies.arrays_of(obj, root))
+    if not mended.is_whole:
+        remains = "; ".join(mended.remains)
+        raise InputError(f"only by hand: {remains}", obj.name, "Check Body marks the places")
+    if not mended.changes:
+        operator.report({"INFO"}, f"{obj.name} needs no repair")
+        return {"CANCELLED"}
+    bodies.put_repaired(obj, root, mended)
+    for line in mended.lines():
+        operator.report({"WARNING"}, sentence(line))
+    return None
 
 
-class MU_OT_body(UnitOperator, bpy.types.Operator):
+@operator(UnitOperator, "Use as Envelope")
+def body(context, root):
     """Make a copy of the selected mesh the unit's envelope, which the lattice then fills"""
-
-    bl_idname = "mu.body"
-    bl_label = "Use as Envelope"
-    bl_options = {"REGISTER", "UNDO"}
-
-    def act(self, context, root):
-        obj = selected_mesh(context)
-        body = bodies.of_object(obj, root)
-        require_sound(body, bodies.examined(body, to_unit(root.mu_unit).dimensions))
-        envelope.put(root, body)
-        obj.hide_set(True)
-        bodies.mark(root, [])
-        unit_object.rebuild(root)
+    obj = selected_mesh(context)
+    body = bodies.of_object(obj, root)
+    require_sound(body, bodies.examined(body, to_unit(root.mu_unit).dimensions))
+    envelope.put(root, body)
+    obj.hide_set(True)
+    bodies.mark(root, [])
+    unit_object.rebuild(root)
 
 
-class MU_OT_body_remove(UnitOperator, bpy.types.Operator):
+@operator(UnitOperator, "Remove Body")
+def body_remove(root):
     """Remove your own body from the unit: the lattice fills its box again"""
-
-    bl_idname = "mu.body_remove"
-    bl_label = "Remove Body"
-    bl_options = {"REGISTER", "UNDO"}
-
-    def act(self, context, root):
-        envelope.remove(root)
-        bodies.mark(root, [])
-        unit_object.rebuild(root)
-
-
-CLASSES = (MU_OT_body_check, MU_OT_body_repair, MU_OT_body, MU_OT_body_remove)
-
-
-register, unregister = bpy.utils.register_classes_factory(CLASSES)
+    envelope.remove(root)
+    bodies.mark(root, [])
+    unit_object.rebuild(root)

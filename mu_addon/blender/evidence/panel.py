@@ -8,14 +8,13 @@ import bpy
 
 from ...design.printing.finding import counted
 from ..import_data.importing import draw_import
-from ..jobs.panel import job_state, start_button, timed_if_measured
-from ..shared.panels import alert, wrapped
+from ..jobs.panel import draw_job, open_buttons, timed_if_measured
+from ..shared.panels import alert, fold, wrapped
 from ..shared.wording import in_panel, readable
 from ..unit.base_classes import DONE, OUTDATED, UnitPanel
 from . import state as evidence
 from . import timeline as evidence_motion
 
-JOB = "evidence_"
 ROWS = 5
 """Number of rows of the dependence table that are shown; the report has them all."""
 ICONS = {"none": "CHECKMARK", "named": "LIGHT", "ambiguous": "QUESTION"}
@@ -25,7 +24,6 @@ ICONS |= {"unidentifiable": "QUESTION", "unexplained": "ERROR"}
 class MU_PT_evidence(UnitPanel, bpy.types.Panel):
     """Diagnosis of measured data: which effect the simulation lacks, and how much the error falls with it"""
 
-    bl_idname = "MU_PT_evidence"
     bl_label = "Evidence"
 
     @classmethod
@@ -47,10 +45,9 @@ class MU_PT_evidence(UnitPanel, bpy.types.Panel):
             alert(layout, found.trouble)
             return
         _experiments(layout, context, root, found.measured)
-        child = evidence.DIAGNOSIS.child(root)
-        words = start_words(root)
-        start_button(layout, child, "mu.evidence_diagnose", "VIEWZOOM", root=root, text=words)
-        job_state(layout, child, "see below", JOB)
+        draw_job(
+            layout, root, evidence.DIAGNOSIS, "mu.evidence_diagnose", "VIEWZOOM", start_words(root), top=True
+        )
         judged = evidence.diagnosis(root)
         if judged is None or not judged.name:
             wrapped(
@@ -87,8 +84,8 @@ def _experiments(layout, context, root, measured):
         wrapped(layout, text, "TIME")
         layout.operator("mu.evidence_protocol", icon="GRAPH").experiment = shown
     if measured.remarks:
-        header, body = layout.panel("MU_remarks", default_closed=True)
-        header.label(text=counted(len(measured.remarks), "remark", "remarks") + " on the data", icon="INFO")
+        count = counted(len(measured.remarks), "remark", "remarks")
+        body = fold(layout, "MU_remarks", f"{count} on the data", icon="INFO")
         if body:
             for remark in measured.remarks:
                 wrapped(body, f"{remark.what} ({Path(remark.where).name})")
@@ -128,9 +125,7 @@ def _verdict(layout, root, judged):
     if judged.summary.get("next"):
         wrapped(column, f"Next: {judged.summary['next']}", "EXPERIMENTAL")
     _dependence(layout, judged)
-    row = layout.row(align=True)
-    row.operator("mu.evidence_open", text="Report", icon="URL").what = "report"
-    row.operator("mu.evidence_open", text="Folder", icon="FILE_FOLDER").what = "folder"
+    open_buttons(layout, evidence.DIAGNOSIS)
     if judged.name == "named":
         layout.operator("mu.evidence_apply", icon="CHECKMARK")
     words = evidence.applied(root)
@@ -143,8 +138,7 @@ def _dependence(layout, judged):
     rows = judged.dependence
     if not rows:
         return
-    header, body = layout.panel("MU_dependence", default_closed=True)
-    header.label(text="Dependence of the Residual")
+    body = fold(layout, "MU_dependence", "Dependence of the Residual")
     if body:
         for against, p, where in rows[:ROWS]:
             row = body.split(factor=0.62)
@@ -156,9 +150,3 @@ def _dependence(layout, judged):
                 wrapped(body, where, "BLANK1")
         if len(rows) > ROWS:
             body.label(text=f"{len(rows) - ROWS} more in the report")
-
-
-CLASSES = (MU_PT_evidence,)
-
-
-register, unregister = bpy.utils.register_classes_factory(CLASSES)

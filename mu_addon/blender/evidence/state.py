@@ -4,6 +4,7 @@
 
 import csv
 import hashlib
+from collections.abc import Iterable
 from pathlib import Path
 from typing import Any
 
@@ -20,12 +21,13 @@ from ...measured.folder import FILE
 from ...reading import file_bytes, file_text, parse_json, parse_toml
 from ...run.folder import write_run
 from ..jobs.start_child import JobKind
+from ..shared.blender_property import path_property
 from ..shared.file_cache import FileCache
-from ..shared.registration import property_group_factory
+from ..shared.registration import property_of
 from ..shared.wording import error_text
 from ..simulate import effects, timings
 from ..simulate import study_folder as studies
-from ..unit.properties import BESIDE_BLEND_FILE, shape_hash, to_unit
+from ..unit.properties import shape_hash, to_unit
 
 FOLDER = "evidence"
 """Folder of the diagnosis in the unit's study folder."""
@@ -39,14 +41,12 @@ NAMES |= {"unidentifiable": "Not identifiable", "unexplained": "Unexplained"}
 """Verdicts by their headings."""
 
 
+@property_of(bpy.types.Object, "mu_evidence")
 class MU_PG_evidence(bpy.types.PropertyGroup):
     """Measured data of a unit."""
 
-    folder: StringProperty(
-        name="Measured Data",
-        description="Folder with experiments.toml and the CSV files it names",
-        subtype="DIR_PATH",
-        options=BESIDE_BLEND_FILE,
+    folder: path_property(
+        "Measured Data", "Folder with experiments.toml and the CSV files it names", folder=True
     )
     # Last model given to the unit, the unit before it, and the changes in words.
     applied: StringProperty(options={"HIDDEN"})
@@ -89,15 +89,15 @@ def folder_of(root: Any) -> Path:
     return studies.folder_of(root) / FOLDER
 
 
-def _detail(data: dict[str, Any]) -> str:
+def _detail(kinds: Iterable[str]) -> str:
     """Detail of a diagnosis: the kinds of its experiments, which decide what is simulated."""
-    return f"diagnose {' '.join(sorted(kind for kind, *_ in data.values()))}"
+    return f"diagnose {' '.join(sorted(kinds))}"
 
 
 def _timed(folder: Path) -> tuple[str, dict[str, Any]]:
     """Detail of a finished diagnosis, and the seconds of its stages."""
-    data = parse_toml(file_text(folder / "diagnose.toml"), "diagnose.toml")["data"]
-    return _detail(data), parse_json(file_bytes(folder / "summary.json"), "summary.json")["seconds"]
+    summary = parse_json(file_bytes(folder / "summary.json"), "summary.json")
+    return _detail(kind for kind, _ in summary["experiments"].values()), summary["seconds"]
 
 
 def announced(root: Any) -> float | None:
@@ -105,10 +105,12 @@ def announced(root: Any) -> float | None:
     found = measured_data(root)
     if found is None or found.measured is None:
         return None
-    return timings.announced(_detail(found.digest["data"]))
+    return timings.announced(_detail(e.kind for e in found.measured.experiments))
 
 
-DIAGNOSIS = JobKind(FOLDER, lambda root: root.mu_unit.uuid, folder_of, "diagnosis", heavy=True)
+DIAGNOSIS = JobKind(
+    FOLDER, lambda root: root.mu_unit.uuid, folder_of, "diagnosis", heavy=True, prefix="evidence_"
+)
 timings.READERS[DIAGNOSIS.name] = _timed
 
 _data: FileCache[MeasuredFolder] = FileCache()
@@ -128,13 +130,11 @@ def measured_data(root: Any) -> MeasuredFolder | None:
 def _read_data(folder: Path) -> MeasuredFolder:
     try:
         measured = read_folder(folder)
-        described = hashlib.sha256(file_bytes(folder / FILE)).hexdigest()
     except MuError as error:
         return MeasuredFolder(None, error_text(error))
     except OSError as error:
         return MeasuredFolder(None, str(error))
-    data = {e.name: [e.kind, e.role, e.sha256] for e in measured.experiments}
-    return MeasuredFolder(measured, digest={"experiments_sha256": described, "data": data})
+    return MeasuredFolder(measured, digest={e.name: e.hash() for e in measured.experiments})
 
 
 def diagnosis(root: Any) -> ShownVerdict | None:
@@ -165,10 +165,11 @@ def _read_run(
 def write_inputs(root: Any, folder: Path) -> None:
     """Write the inputs of the unit's diagnosis into its folder; raises InputError and OutputError."""
     # Imported late: it needs the solver's packages, which a Blender may lack.
-    from ...usecases.diagnose.job import LAYOUT, Job
+    from ...studies.diagnose import Diagnose
 
     measured = read_folder(Path(bpy.path.abspath(root.mu_evidence.folder)))
-    write_run(folder, LAYOUT, Job(measured, to_unit(root.mu_unit)).texts())
+    study = Diagnose(data=measured, unit=to_unit(root.mu_unit)).complete()
+    write_run(folder, Diagnose.layout(), study.texts())
 
 
 def _json(path: Path) -> dict[str, Any]:
@@ -183,7 +184,7 @@ def _stale(root: Any, inputs: dict[str, Any], unit: str) -> str:
     found = measured_data(root)
     if found is None or found.measured is None:
         return "its measured data are not here"
-    if any(inputs.get(key) != value for key, value in found.digest.items()):
+    if inputs.get("data") != found.digest:
         return "made with other measured data"
     try:
         now = shape_hash(to_unit(root.mu_unit))
@@ -243,13 +244,13 @@ class Course:
 SERIES = {"base_model": "model", "extended_model": "extended"}
 
 
-def course(root: Any, name: str) -> Course | None:
-    """A unit_pressure experiment with the diagnosis's prediction of it, or None."""
+def course(root: Any, name: str) -> Course:
+    """A unit_pressure experiment with the diagnosis's prediction of it; raises InputError without one."""
     found, judged = measured_data(root), diagnosis(root)
     every = found.measured.of("unit_pressure") if found and found.measured else ()
     e = next((e for e in every if e.name == name), None)
     if e is None:
-        return None
+        raise InputError(f"No unit under pressure was measured as {name!r}")
     channels = [c for c in e.columns if c == "angle_deg" or c.startswith("marker")]
     series = {"measured": {c: np.array(e[c]) for c in channels}}
     if judged is not None and judged.name and not judged.stale:
@@ -292,6 +293,3 @@ def write_protocol(course: Course, path: Path) -> Path:
     pressure[0] = 0.0  # gauge noise
     write_csv(path, ("time_s", "pressure_kPa"), zip(time.tolist(), pressure.tolist(), strict=True))
     return path
-
-
-register, unregister = property_group_factory(bpy.types.Object, "mu_evidence", (MU_PG_evidence,))

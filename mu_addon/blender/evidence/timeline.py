@@ -13,8 +13,8 @@ from typing import Any
 import bpy
 import numpy as np
 
-from ..preview import materials
-from ..shared import displays
+from ..preview import materials, skeletons
+from ..shared import displays, timeline
 from ..shared.compat import set_curve
 from ..shared.displays import EVIDENCE
 from ..unit.properties import to_unit
@@ -54,8 +54,7 @@ def show(root: Any, name: str, course: Course, scene: Any) -> None:
     frame = _linked(root, FRAME, "Evidence", None)
     frame.hide_viewport = frame.hide_render = True
     d = to_unit(root.mu_unit).dimensions
-    rate = scene.render.fps / scene.render.fps_base
-    frames = scene.frame_start + (course.time_s - course.time_s[0]) * rate
+    frames = timeline.frames_at(scene, course.time_s - course.time_s[0])
     long = 0.55 * d.height
     # The dial is below the unit, since other motions stand beside it, and off the plane of the grid, which
     # would show through it.
@@ -95,11 +94,12 @@ def _markers(frame: Any, course: Course, frames: Any, radius: float) -> list[Any
 
     One that was not seen along x moves in the plane of bending.
     """
-    made = []
+    made, whole = [], skeletons.ball(radius)
+    ball = whole.vertices, [face for faces in whole.faces for face in faces]
     for row, (series, channels) in enumerate(course.series.items()):
         title, colour = LOOKS[series]
         numbers = sorted({int(c[6 : c.index("_")]) for c in channels if c.startswith("marker")})
-        shape = _ring((1.2 + 0.6 * row) * radius) if row else _ball(radius)
+        shape = _ring((1.2 + 0.6 * row) * radius) if row else ball
         for number in numbers:
             places = {i: channels.get(f"marker{number}_{a}_mm") for i, a in enumerate("xyz")}
             known = {i: values for i, values in places.items() if values is not None}
@@ -117,9 +117,7 @@ def reading(root: Any, scene: Any) -> tuple[float, dict[str, float]]:
         if what == ANGLE and not part.hide_viewport:
             found[series] = -float(np.degrees(part.rotation_euler[0]))
         start = part[START]
-    rate = scene.render.fps / scene.render.fps_base
-    time = start + (scene.frame_current_final - scene.frame_start) / rate
-    return time, {series: found[series] for series in LOOKS if series in found}
+    return start + timeline.seconds_at(scene), {series: found[series] for series in LOOKS if series in found}
 
 
 def _animate(part: Any, path: str, channels: dict[int, Any], frames: Any) -> None:
@@ -207,27 +205,4 @@ def _ring(radius: float, around: int = 32) -> tuple[Any, Any]:
     circle = np.stack([np.zeros(around), np.cos(turn), np.sin(turn)], axis=1)
     vertices = radius * np.concatenate([circle, 0.75 * circle])
     faces = [(i, (i + 1) % around, around + (i + 1) % around, around + i) for i in range(around)]
-    return vertices, faces
-
-
-def _ball(radius: float, around: int = 16) -> tuple[Any, Any]:
-    """A ball as rings of quadrilaterals between two poles."""
-    polar = np.linspace(0.0, np.pi, around // 2 + 1)[1:-1]
-    turn = np.linspace(0.0, 2 * np.pi, around, endpoint=False)
-    rings = np.stack(
-        [
-            np.outer(np.sin(polar), np.cos(turn)),
-            np.outer(np.sin(polar), np.sin(turn)),
-            np.repeat(np.cos(polar)[:, None], around, axis=1),
-        ],
-        axis=-1,
-    ).reshape(-1, 3)
-    vertices = radius * np.concatenate([rings, [[0.0, 0.0, 1.0], [0.0, 0.0, -1.0]]])
-    faces = []
-    last = (len(polar) - 1) * around
-    for i in range(around):
-        j = (i + 1) % around
-        for k in range(0, last, around):
-            faces.append((k + i, k + around + i, k + around + j, k + j))
-        faces += [(len(rings), i, j), (len(rings) + 1, last + j, last + i)]
     return vertices, faces

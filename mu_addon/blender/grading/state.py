@@ -11,12 +11,13 @@ from ...design.factor_list import LEAST, MOST
 from ...design.grading import Field
 from ...errors import InputError
 from ..preview.materials import material
+from ..preview.skeletons import box
 from ..shared import displays
 
 # Edge of a cube over that of its cell: small enough to see and paint the cells behind it.
 _SHARE = 0.5
-_CORNERS = np.array(list(np.ndindex(2, 2, 2))) - 0.5
-_FACES = np.array([[0, 1, 3, 2], [4, 6, 7, 5], [0, 4, 5, 1], [2, 3, 7, 6], [0, 2, 6, 4], [1, 5, 7, 3]])
+_CUBE = box((-0.5,) * 3, (0.5,) * 3)
+_CORNERS, (_FACES,) = _CUBE.vertices, _CUBE.faces
 
 
 def painted_on(root: Any) -> Any | None:

@@ -18,6 +18,7 @@ from ...grasp.settings import BEYOND
 from ..preview import materials, skeletons
 from ..shared import displays, updates
 from ..shared.blender_property import exact
+from ..shared.registration import connected
 from ..shared.wording import error_text
 from ..unit import drawing
 from ..unit import object as unit_object
@@ -52,7 +53,7 @@ def active(context: Any) -> Any | None:
 
 def part(root: Any, name: str) -> Any | None:
     """The gripper's part of that name, or None."""
-    return next((child for child in root.children if child.get(PART) == name), None)
+    return displays.part(root, PART, name)
 
 
 def create(context: Any, gripper: Gripper) -> Any:
@@ -140,16 +141,7 @@ def new_part(root: Any, name: str) -> Any:
     return displays.lock(displays.add(root, PART, name, bpy.data.meshes.new(title)))
 
 
+@connected(PARAMETERS_CHANGED)
 def _parameters_changed(root: Any) -> None:
     if not updates.are_paused() and root.mu_gripper.uuid:
         rebuild(root)
-
-
-def register() -> None:
-    """Connect the rebuild to changes of a gripper's parameters."""
-    PARAMETERS_CHANGED.connect(_parameters_changed)
-
-
-def unregister() -> None:
-    """Disconnect it."""
-    PARAMETERS_CHANGED.disconnect(_parameters_changed)

@@ -7,14 +7,12 @@ import bpy
 from ...design.gripper import SECTIONS
 from ...design.quantity import describe
 from ...grasp.phases import WORDS
-from ..jobs.panel import job_state, start_button
-from ..shared.panels import RootPanel, alert, wrapped
+from ..jobs.panel import draw_job, open_buttons
+from ..shared.panels import RootPanel, alert, plain_row, wrapped
 from ..unit.fields import field
 from . import object as gripper_object
 from . import state as grasps
 from . import timeline
-
-JOB = "grasp_"
 
 
 class GripperPanel(RootPanel):
@@ -26,7 +24,6 @@ class GripperPanel(RootPanel):
 class MU_PT_gripper(GripperPanel, bpy.types.Panel):
     """The active gripper"""
 
-    bl_idname = "MU_PT_gripper"
     bl_label = "Monolithic Gripper"
 
     def show(self, layout, context, root):
@@ -34,9 +31,7 @@ class MU_PT_gripper(GripperPanel, bpy.types.Panel):
         row = layout.row(align=True)
         row.prop(root, "name", text="")
         row.operator("mu.gripper_delete", text="", icon="TRASH")
-        row = layout.row()
-        row.use_property_split = False
-        row.prop(props, "cut", icon="MOD_BOOLEAN", toggle=True)
+        plain_row(layout).prop(props, "cut", icon="MOD_BOOLEAN", toggle=True)
         if props.trouble:
             alert(layout, props.trouble)
         layout.prop(props, "paths")
@@ -51,7 +46,6 @@ class MU_PT_gripper(GripperPanel, bpy.types.Panel):
 class MU_PT_grasp(GripperPanel, bpy.types.Panel):
     """The grasp of a cube: closing, holding, lifting, releasing"""
 
-    bl_idname = "MU_PT_grasp"
     bl_label = "Grasp"
     bl_parent_id = "MU_PT_gripper"
 
@@ -66,19 +60,16 @@ class MU_PT_grasp(GripperPanel, bpy.types.Panel):
             column.prop(props, "density_g_per_ml")
             column.prop(props, "friction")
             layout.prop(props, "self_contact")
-        child = grasps.GRASP.child(root)
         name = "Make the Part" if props.detail == "part" else "Grasp"
-        start_button(layout, child, "mu.grasp", "PLAY", text=grasps.GRASPING.label(root, name))
-        job_state(layout, child, "see below", JOB)
+        words = grasps.GRASPING.label(root, name)
+        draw_job(layout, root, grasps.GRASP, "mu.grasp", "PLAY", words)
         found = grasps.of(root)
         if found is None:
             wrapped(layout, "This cube was not grasped yet", "INFO")
         else:
             _found(layout, context.scene, root, found)
         if grasps.folder_of(root).is_dir():
-            row = layout.row(align=True)
-            row.operator("mu.grasp_open", text="Report", icon="URL").what = "report"
-            row.operator("mu.grasp_open", text="Folder", icon="FILE_FOLDER").what = "folder"
+            open_buttons(layout, grasps.GRASP)
 
 
 def _found(layout, scene, root, found):
@@ -102,9 +93,3 @@ def _found(layout, scene, root, found):
     if on:
         phase, force = grasps.phase_at(found, scene)
         box.label(text=f"{WORDS.get(phase, phase).capitalize()}: {force:.2f} N", icon="TIME")
-
-
-CLASSES = (MU_PT_gripper, MU_PT_grasp)
-
-
-register, unregister = bpy.utils.register_classes_factory(CLASSES)

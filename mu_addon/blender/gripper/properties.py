@@ -14,11 +14,11 @@ from ...design.settings import FRICTION
 from ...grasp.settings import DENSITY
 from ...meshing.settings import SELF_CONTACT
 from ..shared import displays
-from ..shared.blender_property import MILLIMETRES, blender_property, exact, millimetres
-from ..shared.registration import property_group_factory
+from ..shared.blender_property import MILLIMETRES, blender_property, exact, millimetres, path_property
+from ..shared.registration import property_of
 from ..shared.updates import Signal
-from ..unit.fields import generated_fields, path_menu
-from ..unit.properties import BESIDE_BLEND_FILE, title_property
+from ..unit.fields import generated_group, path_menu, set_sections
+from ..unit.properties import title_property
 
 PARAMETERS_CHANGED = Signal()
 """Sent with the root of the gripper whose parameters changed."""
@@ -28,16 +28,7 @@ def _changed(group, context):
     PARAMETERS_CHANGED.send(group.id_data)
 
 
-def _generated(section: type):
-    annotations = generated_fields(section, _changed)
-    return type(
-        f"MU_PG_gripper_{section.section}",
-        (bpy.types.PropertyGroup,),
-        {"__annotations__": annotations, "__doc__": section.__doc__},
-    )
-
-
-GROUPS = {section.section: _generated(section) for section in SECTIONS}
+GROUPS = {s.section: generated_group(s, _changed, "MU_PG_gripper_") for s in SECTIONS}
 
 
 @lru_cache(maxsize=32)
@@ -45,21 +36,18 @@ def _chambers(finger: str) -> int:
     return parameters.from_toml(finger).chambers.count
 
 
-def _cube_of(root):
-    return next((child for child in root.children if child.get(displays.GRIPPER) == "cube"), None)
-
-
 def _cube_height(props):
-    cube = _cube_of(props.id_data)
+    cube = displays.part(props.id_data, displays.GRIPPER, "cube")
     return 0.0 if cube is None else cube.location.z
 
 
 def _put_cube(props, value):
-    cube = _cube_of(props.id_data)
+    cube = displays.part(props.id_data, displays.GRIPPER, "cube")
     if cube is not None:
         cube.location.z = value
 
 
+@property_of(bpy.types.Object, "mu_gripper")
 class MU_PG_gripper(bpy.types.PropertyGroup):
     """One Monolithic Gripper, kept on its root object."""
 
@@ -108,17 +96,16 @@ class MU_PG_gripper(bpy.types.PropertyGroup):
             ],
         ),
         "self_contact": blender_property(SELF_CONTACT, name="Self-Contact"),
-        "folder": StringProperty(
-            name="Grasp Folder",
-            description="Folder of the results. Empty: beside the .blend file, or the user's folder",
-            subtype="DIR_PATH",
-            options=BESIDE_BLEND_FILE,
+        "folder": path_property(
+            "Grasp Folder",
+            "Folder of the results. Empty: beside the .blend file, or the user's folder",
+            folder=True,
         ),
         "trouble": StringProperty(options={"HIDDEN"}),
     }
 
 
-CLASSES = (*GROUPS.values(), MU_PG_gripper)
+CLASSES = (*GROUPS.values(),)
 
 
 def to_gripper(props) -> Gripper:
@@ -137,10 +124,4 @@ def from_gripper(props, gripper: Gripper) -> None:
     """Set the properties to a gripper; each still calls its update, see `updates.paused`."""
     props.finger = parameters.to_toml(gripper.unit, comments=False)
     props.title, props.path = gripper.name, gripper.path
-    for section in SECTIONS:
-        group, values = getattr(props, section.section), getattr(gripper, section.section)
-        for d in describe(section):
-            setattr(group, d.name, getattr(values, d.name))
-
-
-register, unregister = property_group_factory(bpy.types.Object, "mu_gripper", CLASSES)
+    set_sections(props, SECTIONS, gripper)

@@ -10,6 +10,7 @@ import attrs
 import numpy as np
 
 from ..jobs.start_child import JobKind
+from ..shared import timeline
 from ..shared.blender_property import exact
 from ..shared.file_cache import FileCache
 from ..simulate import study_folder as studies
@@ -48,6 +49,7 @@ GRASP = JobKind(
     folder_of,
     "grasp",
     heavy=True,
+    prefix="grasp_",
     plan_of=lambda root: GRASPING.plan(root),
 )
 GRASPING = StudyJob(
@@ -105,8 +107,7 @@ def _read_table(path: Path) -> tuple[tuple[str, ...], dict[str, Any]]:
 
 def phase_at(found: Grasped, scene: Any) -> tuple[str, float]:
     """Phase of the grasp and force in N of a finger on the cube at the scene's frame."""
-    rate = scene.render.fps / scene.render.fps_base
     time = found.columns["time_s"]
-    now = time[0] + (scene.frame_current_final - scene.frame_start) / rate
+    now = time[0] + timeline.seconds_at(scene)
     at = min(int(np.searchsorted(time, now - 1e-6)), len(time) - 1)
     return found.phase[at], float(np.interp(now, time, found.columns["normal_N"]))

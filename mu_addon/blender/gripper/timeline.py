@@ -13,8 +13,9 @@ from ...errors import InputError, MuError
 from ...files import read_npz
 from ..preview import materials, skeletons
 from ..results import motion as motion_parts
-from ..shared import displays
+from ..shared import displays, timeline
 from ..shared.compat import set_curve
+from ..shared.registration import connected
 from . import object as gripper_object
 from . import state as grasps
 from .properties import PARAMETERS_CHANGED
@@ -38,7 +39,6 @@ def show(root: Any, scene: Any) -> None:
             "there is no grasp of this cube yet", str(grasps.folder_of(root)), "press Grasp first"
         )
     hide(root)
-    rate = scene.render.fps / scene.render.fps_base
     time = data["time_s"]
     cut = root.mu_gripper.cut
     whole = [(rest, data["triangles"], data["membrane"]) for rest in data["rest_mm"]]
@@ -54,7 +54,7 @@ def show(root: Any, scene: Any) -> None:
         motion_parts.play(obj, file, motion_parts.step_of(file))
     half = np.full(3, float(data["cube_side_mm"]) / 2.0)
     cube = gripper_object.put_box(root, gripper_object.MOVING + "cube", -half, half, "MU Obstacle")
-    frames = scene.frame_start + (time - time[0]) * rate
+    frames = timeline.frames_at(scene, time - time[0])
     for axis in range(3):
         set_curve(cube, "location", axis, frames, data["cube_mm"][:, axis])
     scene.frame_end = int(np.ceil(frames[-1]))
@@ -68,6 +68,7 @@ def _halves(folder: Path) -> Any:
     return write_halves(folder)
 
 
+@connected(PARAMETERS_CHANGED)
 def _follow(root: Any) -> None:
     """Cut a played grasp open, or close it, by the gripper's setting."""
     shown = parts(root)
@@ -89,13 +90,3 @@ def _hide_preview(root: Any, hidden: bool) -> None:
     if cube is not None:
         cube.hide_viewport = cube.hide_render = hidden
     gripper_object.rebuild(root)
-
-
-def register() -> None:
-    """Let a played grasp follow the gripper's setting."""
-    PARAMETERS_CHANGED.connect(_follow)
-
-
-def unregister() -> None:
-    """Disconnect it."""
-    PARAMETERS_CHANGED.disconnect(_follow)

@@ -8,15 +8,15 @@ import bpy
 from bpy.props import BoolProperty, CollectionProperty, StringProperty
 
 from ...design.printing.finding import counted
-from ...errors import MuError
+from ...errors import InputError, MuError
 from ...files import make_folder
 from ...run.context import RunContext
 from ...run.execution import Execution
 from ...run.progress import Progress
 from ..shared import viewports
-from ..shared.operators import open_file
+from ..shared.operators import open_file, operator
 from ..shared.panels import wrapped
-from ..shared.registration import property_group_factory
+from ..shared.registration import property_of
 from ..simulate import study_folder as studies
 from ..unit.base_classes import UnitOperator
 
@@ -42,6 +42,7 @@ class MU_PG_import_answer(bpy.types.PropertyGroup):
     )
 
 
+@property_of(bpy.types.Object, "mu_import")
 class MU_PG_import(bpy.types.PropertyGroup):
     """Files being imported into a folder of measured data."""
 
@@ -57,9 +58,7 @@ ENDINGS = "*.csv;*.txt;*.tsv;*.dat;*.tra;*.xlsx;*.xls;*.xlsm;*.xlsb;*.ods"
 class MU_OT_import_files(UnitOperator, bpy.types.Operator):
     """Read files exported by test machines and data loggers into the unit's measured data"""
 
-    bl_idname = "mu.import_files"
     bl_label = "Import Files..."
-    bl_options = {"REGISTER", "UNDO"}
 
     directory: StringProperty(subtype="DIR_PATH", options={"HIDDEN", "SKIP_SAVE"})
     files: CollectionProperty(type=bpy.types.OperatorFileListElement, options={"HIDDEN", "SKIP_SAVE"})
@@ -72,8 +71,7 @@ class MU_OT_import_files(UnitOperator, bpy.types.Operator):
     def act(self, context, root):
         chosen = [str(Path(self.directory) / one.name) for one in self.files if one.name]
         if not chosen:
-            self.report({"ERROR"}, "No file was chosen: choose one or more files of measured data")
-            return {"CANCELLED"}
+            raise InputError("No file was chosen: choose one or more files of measured data")
         root.mu_import.answers.clear()
         root.mu_import.files = "\n".join(chosen)
         return _import(self, root)
@@ -82,15 +80,12 @@ class MU_OT_import_files(UnitOperator, bpy.types.Operator):
 class MU_OT_import_answers(UnitOperator, bpy.types.Operator):
     """Import the files with these answers"""
 
-    bl_idname = "mu.import_answers"
     bl_label = "Import with These Answers"
-    bl_options = {"REGISTER", "UNDO"}
 
     def act(self, context, root):
         lacking = [one for one in root.mu_import.answers if not one.value.strip()]
         if lacking:
-            self.report({"ERROR"}, f"Not answered: {lacking[0].words}")
-            return {"CANCELLED"}
+            raise InputError(f"Not answered: {lacking[0].words}")
         for one in root.mu_import.answers:
             one.answered = True
         try:
@@ -102,33 +97,21 @@ class MU_OT_import_answers(UnitOperator, bpy.types.Operator):
             raise
 
 
-class MU_OT_import_cancel(UnitOperator, bpy.types.Operator):
+@operator(UnitOperator, "Do Not Import")
+def import_cancel(root):
     """Leave these files out"""
-
-    bl_idname = "mu.import_cancel"
-    bl_label = "Do Not Import"
-    bl_options = {"REGISTER", "UNDO"}
-
-    def act(self, context, root):
-        _forget(root)
+    _forget(root)
 
 
-class MU_OT_import_page(UnitOperator, bpy.types.Operator):
+@operator(UnitOperator, "What Was Understood", undo=False)
+def import_page(context, root):
     """Open the page that shows how the files were read"""
+    from ...studies.import_ import PAGE
 
-    bl_idname = "mu.import_page"
-    bl_label = "What Was Understood"
-    bl_options = {"REGISTER"}
-
-    def act(self, context, root):
-        from ...studies.import_ import PAGE
-
-        page = _folder(root) / PAGE
-        if not page.exists():
-            self.report({"ERROR"}, "Nothing was imported into this folder: choose Import Files first")
-            return {"CANCELLED"}
-        open_file(context, page)
-        return {"FINISHED"}
+    page = _folder(root) / PAGE
+    if not page.exists():
+        raise InputError("Nothing was imported into this folder: choose Import Files first")
+    open_file(context, page)
 
 
 def _folder(root):
@@ -194,23 +177,3 @@ def draw_import(layout, root):
     row = box.row(align=True)
     row.operator("mu.import_page", icon="URL")
     row.operator("mu.import_cancel", text="", icon="X")
-
-
-_add_group, _remove_group = property_group_factory(
-    bpy.types.Object, "mu_import", (MU_PG_import_answer, MU_PG_import)
-)
-_add_classes, _remove_classes = bpy.utils.register_classes_factory(
-    (MU_OT_import_files, MU_OT_import_answers, MU_OT_import_cancel, MU_OT_import_page)
-)
-
-
-def register() -> None:
-    """Register properties and operators."""
-    _add_group()
-    _add_classes()
-
-
-def unregister() -> None:
-    """Unregister them."""
-    _remove_classes()
-    _remove_group()

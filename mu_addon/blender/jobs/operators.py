@@ -27,6 +27,9 @@ RUN_FILES = [
 """Files of a run that can be opened, as items of a property."""
 
 
+KEPT = "finished stages are kept, and the next run continues from there"
+
+
 class _Cancel:
     """Stops the job; greyed out, with the reason, where none runs."""
 
@@ -54,21 +57,20 @@ class _Open:
 
 def job_operators(
     kind: JobKind,
-    prefix: str,
-    noun: str,
-    *,
-    kept: str,
     first: str,
+    *,
+    kept: str = KEPT,
     base: type = UnitOperator,
     items: list[tuple[str, str, str]] = RUN_FILES,
     path_of: Callable[[Any, str], Path] | None = None,
 ) -> tuple[type, type, type]:
-    """Operator classes mu.PREFIXcancel, mu.PREFIXdismiss and mu.PREFIXopen of a kind of job.
+    """Operator classes mu.PREFIXcancel, mu.PREFIXdismiss and mu.PREFIXopen of a kind of job, by its prefix.
 
-    noun: name of the job; kept: results that remain when it is stopped; first: what to do before there is a
-    file; base: operator of the object with the job; items: files to open, with paths by `path_of(root,
-    what)`, by default in the run's folder.
+    first: what to do before there is a file; kept: results that remain when it is stopped; base: operator of
+    the object with the job; items: files to open, with paths by `path_of(root, what)`, by default in the
+    run's folder.
     """
+    prefix, noun = kind.prefix, kind.title
 
     def in_run(root: Any, what: str) -> Path:
         return kind.folder_of(root) / FILES[what]

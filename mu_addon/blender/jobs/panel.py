@@ -23,6 +23,25 @@ def start_button(layout, child, operator: str, icon: str, **settings) -> None:
         large_button(layout, operator, icon, **settings)
 
 
+def draw_job(
+    layout, root, kind, operator: str, icon: str, text: str, top: bool = False, where: str = "see below"
+) -> None:
+    """Draw the button that starts a root's job, and its progress or its end; where: its results are shown.
+
+    top: the top of the sidebar may offer it in its place.
+    """
+    child = kind.child(root)
+    start_button(layout, child, operator, icon, root=root if top else None, text=text)
+    job_state(layout, child, where, kind.prefix)
+
+
+def open_buttons(layout, kind) -> None:
+    """Draw the buttons that open report and folder of a kind of job."""
+    row = layout.row(align=True)
+    row.operator(f"mu.{kind.prefix}open", text="Report", icon="URL").what = "report"
+    row.operator(f"mu.{kind.prefix}open", text="Folder", icon="FILE_FOLDER").what = "folder"
+
+
 def rounded(seconds: float) -> str:
     """A duration to about a tenth: "40 s", "9 min", "3 h 30 min"."""
     if seconds < 90.0:

@@ -42,6 +42,3 @@ def deleted_with_it() -> str:
         f"Uninstalling deletes the results of {of} in files that were never saved. "
         "Save a file to keep its results next to it."
     )
-
-
-register, unregister = bpy.utils.register_classes_factory((MU_AP_preferences,))

@@ -18,6 +18,7 @@ from ...run.child import DONE
 from ...run.folder import write_run
 from ..shared import viewports
 from ..shared.operators import NotReady, in_script
+from ..shared.registration import at_end, connected
 from .start_child import JOB_ENDED, JobKind, child_of, forget
 
 
@@ -68,6 +69,7 @@ def _kind(wanted: NotPrepared) -> JobKind:
     return JobKind(f"prepare-{wanted.folder.name}", lambda _: name, lambda _: wanted.folder, wanted.title)
 
 
+@connected(JOB_ENDED)
 def _ended(key: str) -> None:
     from ...usecases.prepare import RESULT
 
@@ -85,12 +87,6 @@ def _ended(key: str) -> None:
     viewports.redraw()
 
 
-def register() -> None:
-    """Connect to the end of jobs."""
-    JOB_ENDED.connect(_ended)
-
-
-def unregister() -> None:
-    """Disconnect from it."""
-    JOB_ENDED.disconnect(_ended)
+@at_end
+def _forget() -> None:
     _waiting.clear()

@@ -28,6 +28,7 @@ from ...run.found_child import FoundChild
 from ...run.interpreter import environment, worker_command
 from ...run.progress_estimate import Plan
 from ..shared import viewports
+from ..shared.registration import at_end, at_start, timer
 from ..shared.updates import Signal
 from . import lasting_jobs
 
@@ -39,7 +40,7 @@ WRITERS = (
     "tomlkit",
     "mu_addon.evidence.effect",
     "mu_addon.evidence.prediction.specimen",
-    "mu_addon.evidence.unit_effects",
+    "mu_addon.evidence.unit_body",
     "mu_addon.fem.newton_settings",
     "mu_addon.placement.graph",
     "mu_addon.usecases.simulate_and_place.named_effects",
@@ -69,12 +70,33 @@ OWN_FOLDER = "blender"
 JOB_ENDED = Signal()
 """Sent with the key of a job that has ended."""
 
-_children: dict[str, Child] = {}
-_titles: dict[str, str] = {}
-_heavy: set[str] = set()
-"""Keys of jobs that run one at a time."""
-_lasting: set[str] = set()
-"""Keys of jobs that may outlive Blender."""
+
+@attrs.define(eq=False)
+class Job:
+    """A job of this session, running or ended: its key, its child, its title in the header, "" for none.
+
+    heavy: takes the machine for minutes, and runs one at a time; lasts: outlives Blender if the user wants.
+    """
+
+    key: str
+    child: Child
+    title: str = ""
+    heavy: bool = False
+    lasts: bool = False
+
+    @property
+    def runs(self) -> bool:
+        """True if it runs, or waits for another one."""
+        return self.child.state in (RUNNING, WAITING)
+
+    @property
+    def goes_on(self) -> bool:
+        """True if it outlives Blender: it runs, and does not wait."""
+        return self.lasts and self.child.state == RUNNING and _wanted()
+
+
+_jobs: dict[str, Job] = {}
+"""By key, in the order in which they were started."""
 
 
 def missing(modules: Sequence[str] = SOLVER) -> list[str]:
@@ -109,7 +131,8 @@ class JobKind:
 
     name: of the kind; uuid_of, folder_of: identifier of a root object and folder of its run. title: name of
     the job; heavy: takes the machine for minutes, so that only one such job runs at a time and others wait;
-    plan_of: its expected stages for an object; outlives: may continue after Blender ends, as heavy ones may.
+    plan_of: its expected stages for an object; outlives: may continue after Blender ends, as heavy ones may;
+    prefix: of the names of its operators, see `job_operators`.
     """
 
     name: str
@@ -119,6 +142,7 @@ class JobKind:
     heavy: bool = False
     plan_of: Callable[[Any], Plan] = lambda root: ()
     outlives: bool = False
+    prefix: str = ""
 
     def key(self, root: Any) -> str:
         """Identifier of the job of that object."""
@@ -130,7 +154,8 @@ class JobKind:
 
     def is_running(self, root: Any) -> bool:
         """Return True if the job runs, or waits for another one."""
-        return self.key(root) in running()
+        job = _jobs.get(self.key(root))
+        return job is not None and job.runs
 
     def start(
         self, root: Any, folder: Path, write_inputs: Callable[[Path], None], options: Sequence[str] = ()
@@ -143,63 +168,44 @@ class JobKind:
             raise InputError("this job is running already", str(folder), "wait for it or cancel it")
         write_inputs(folder)
         key, plan = self.key(root), self.plan_of(root)
-        waits = self.heavy and any(key in _heavy for key in running())
+        waits = self.heavy and is_busy()
         child = start(["resume", str(folder), "--json", *options], folder, plan=plan, waits=waits)
-        if self.heavy:
-            _heavy.add(key)
-        title = f"{root.name}: {self.title}"
-        if self.heavy or self.outlives:
-            last(lasting_jobs.Record(key, title, folder, lasting_jobs.now_s(), tuple(plan), self.heavy))
-        return watch(key, child, title)
+        title, lasts = f"{root.name}: {self.title}", self.heavy or self.outlives
+        if lasts:
+            record = lasting_jobs.Record(key, title, folder, lasting_jobs.now_s(), tuple(plan), self.heavy)
+            lasting_jobs.keep(record)
+        return watch(key, child, title, self.heavy, lasts)
 
     def dismiss(self, root: Any) -> None:
         """Remove an ended job, so that no panel shows it."""
-        child = self.child(root)
-        if child is not None and child.state not in (RUNNING, WAITING):
+        if not self.is_running(root):
             forget(self.key(root))
 
 
 def child_of(key: str) -> Child | None:
     """The latest child of the job of that key, running or ended, or None."""
-    return _children.get(key)
+    return _jobs[key].child if key in _jobs else None
 
 
-def running() -> list[str]:
-    """Keys of the running or waiting jobs, in the order in which they were started."""
-    return [key for key, child in _children.items() if child.state in (RUNNING, WAITING)]
+def running() -> list[Job]:
+    """The running or waiting jobs, in the order in which they were started."""
+    return [job for job in _jobs.values() if job.runs]
 
 
 def is_busy() -> bool:
     """Return True if a job that takes the machine for minutes runs."""
-    return any(key in _heavy for key in running())
+    return any(job.heavy for job in running())
 
 
-def title_of(key: str) -> str:
-    """Title of a job with its object; "" for one without a place in the header."""
-    return _titles.get(key, "")
-
-
-def ended() -> list[str]:
-    """Keys of the jobs with a title that have ended and were not dismissed, the latest last."""
-    return [key for key, child in _children.items() if key in _titles and key not in running()]
+def ended() -> list[Job]:
+    """The jobs with a title that have ended and were not dismissed, the latest last."""
+    return [job for job in _jobs.values() if job.title and not job.runs]
 
 
 def hush() -> None:
     """Drop the notices of ended jobs; their panels still tell."""
-    for key in ended():
-        del _titles[key]
-
-
-def last(record: lasting_jobs.Record) -> None:
-    """Let a job outlive Blender, unless the user decides otherwise."""
-    _lasting.add(record.key)
-    lasting_jobs.keep(record)
-
-
-def goes_on(key: str) -> bool:
-    """Return True if a job outlives Blender: it runs, and does not wait."""
-    child = _children.get(key)
-    return _wanted() and key in _lasting and child is not None and child.state == RUNNING
+    for job in ended():
+        job.title = ""
 
 
 def _wanted() -> bool:
@@ -210,32 +216,28 @@ def _wanted() -> bool:
 
 def forget(key: str) -> None:
     """Remove a job that has ended."""
-    _children.pop(key, None)
-    _titles.pop(key, None)
+    _jobs.pop(key, None)
 
 
-def watch(key: str, child: Child, title: str = "") -> Child:
-    """Let the timer read a child's messages, as the job of that key; title: in the header."""
+def watch(key: str, child: Child, title: str = "", heavy: bool = False, lasts: bool = False) -> Child:
+    """Let the timer read a child's messages, as the job of that key; see `Job`."""
     # Appended again: jobs are listed in the order in which they were started.
     forget(key)
-    _children[key] = child
-    if title:
-        _titles[key] = title
-    if not bpy.app.timers.is_registered(_poll):
-        # Persistent: loading another file does not end a job.
-        bpy.app.timers.register(_poll, first_interval=INTERVAL_S, persistent=True)
+    _jobs[key] = Job(key, child, title, heavy, lasts)
+    _poll.soon(INTERVAL_S)
+    viewports.redraw()
     return child
 
 
 def poll() -> bool:
     """Read the new output of every child; return True if there was any."""
-    news = [child.poll() for child in _children.values()]
+    news = [job.child.poll() for job in _jobs.values()]
     return _begin_next() or any(news)
 
 
 def _begin_next() -> bool:
     """Start the first waiting job if none of its kind runs; return True if there was one."""
-    heavy = [child for key, child in _children.items() if key in _heavy]
+    heavy = [job.child for job in _jobs.values() if job.heavy]
     waiting = [child for child in heavy if child.state == WAITING]
     if not waiting or any(child.state == RUNNING for child in heavy):
         return False
@@ -268,52 +270,52 @@ class _Redraws:
         if changed:
             viewports.redraw()
         elif self._news:
-            viewports.redraw_panels()
+            viewports.redraw_regions("UI")
         self._news = False
 
 
 _redraws = _Redraws()
 
 
+@timer(lasts=True)
 def _poll() -> float | None:
     before = running()
     news = poll()
     if news or before:
         _redraws.tell(news, before != running())
-    for key in set(before) - set(running()):
-        lasting_jobs.drop(key)
-        JOB_ENDED.send(key)
+    for job in before:
+        if not job.runs:
+            lasting_jobs.drop(job.key)
+            JOB_ENDED.send(job.key)
     return INTERVAL_S if running() else None
 
 
 def _end_all() -> None:
     """End the jobs that do not outlive Blender."""
-    leaves = False
-    for key, child in _children.items():
-        if goes_on(key):
-            leaves = True
-        else:
-            child.kill()
-            lasting_jobs.drop(key)
-    lasting_jobs.close(leaves)
+    left = [job for job in _jobs.values() if job.goes_on]
+    for job in _jobs.values():
+        if job not in left:
+            job.child.kill()
+            lasting_jobs.drop(job.key)
+    lasting_jobs.close(bool(left))
 
 
+@timer(lasts=True, after_s=LOAD_AFTER_S)
 def _take_up() -> None:
     """Watch the jobs of former sessions, running or ended."""
     for record in lasting_jobs.take_up():
-        if record.key in running():
+        if record.key in [job.key for job in running()]:
             continue
         try:
             child = FoundChild(record.run, record.run / OWN_FOLDER, record.plan, record.started_s)
         except MuError:
             # Its folder is gone, and its messages with it.
             continue
-        if record.heavy:
-            _heavy.add(record.key)
-        last(record)
-        watch(record.key, child, record.title)
+        lasting_jobs.keep(record)
+        watch(record.key, child, record.title, record.heavy, lasts=True)
 
 
+@timer(lasts=True, after_s=LOAD_AFTER_S)
 def _load_writer() -> float | None:
     """Load the writers of a job's inputs, a module at a time, so that the first job starts quickly."""
     if missing(WRITERS[:1]):
@@ -326,19 +328,13 @@ def _load_writer() -> float | None:
     return None
 
 
-def register() -> None:
-    """Take over jobs of former sessions; at exit, end those that do not outlive Blender."""
+@at_start
+def _end_at_exit() -> None:
     atexit.register(_end_all)
-    for timer in (_load_writer, _take_up):
-        bpy.app.timers.register(timer, first_interval=LOAD_AFTER_S, persistent=True)
 
 
-def unregister() -> None:
-    """End every child that does not outlive Blender, and the timers."""
+@at_end
+def _end() -> None:
     atexit.unregister(_end_all)
     _end_all()
-    for kept in (_children, _titles, _heavy, _lasting):
-        kept.clear()
-    for timer in (_poll, _load_writer, _take_up):
-        if bpy.app.timers.is_registered(timer):
-            bpy.app.timers.unregister(timer)
+    _jobs.clear()

@@ -5,7 +5,7 @@
 import bpy
 from bpy.props import BoolProperty, EnumProperty, FloatProperty
 
-from ..shared.registration import property_group_factory
+from ..shared.registration import property_of
 from ..shared.updates import Signal
 
 SWITCHED, PRESSED, COLOURED = Signal(), Signal(), Signal()
@@ -14,6 +14,7 @@ colours were chosen."""
 PLAIN = "plain"
 
 
+@property_of(bpy.types.Object, "mu_live")
 class MU_PG_live(bpy.types.PropertyGroup):
     """Bending of a unit while it is designed."""
 
@@ -44,6 +45,3 @@ class MU_PG_live(bpy.types.PropertyGroup):
         ],
         update=lambda live, context: COLOURED.send(live.id_data),
     )
-
-
-register, unregister = property_group_factory(bpy.types.Object, "mu_live", (MU_PG_live,))

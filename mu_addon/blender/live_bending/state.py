@@ -15,7 +15,6 @@ from typing import Any
 import attrs
 import bpy
 import numpy as np
-from bpy.app.handlers import persistent
 
 from ...errors import InputError, MuError
 from ...placement.sampling import polynomials
@@ -24,10 +23,10 @@ from ...report.motion_files import REGIONS, Motion, read_motion
 from ...run.child import RUNNING, Child
 from ...run.folder import write_run
 from ..jobs import start_child
-from ..preview import skeletons
+from ..results import bodies
 from ..shared import displays, viewports
 from ..shared.displays import LIVE
-from ..shared.registration import add_handlers, remove_handlers
+from ..shared.registration import RESTORED, at_end, connected, handler, timer
 from ..simulate import job as simulation
 from ..simulate import study_folder as studies
 from ..unit import object as unit_object
@@ -110,7 +109,7 @@ def of(root: Any) -> Live | None:
 
 def parts(root: Any) -> list[Any]:
     """The objects of a unit's live shape: one a region."""
-    return [child for child in root.children if child.get(LIVE)]
+    return displays.parts(root, LIVE)
 
 
 def angle_at(shape: Shape, kPa: float) -> float:
@@ -131,6 +130,7 @@ def most_kPa(root: Any) -> float:
     )
 
 
+@connected(SWITCHED)
 def _switched(root: Any) -> None:
     uuid = root.mu_unit.uuid
     if not uuid:
@@ -146,11 +146,11 @@ def _switched(root: Any) -> None:
     if found is not None:
         found.end()
         shutil.rmtree(found.folder, ignore_errors=True)
-    for part in parts(root):
-        displays.remove(part)
+    displays.clear(root, LIVE)
     unit_object.show(root)
 
 
+@connected(unit_object.REBUILT)
 def _changed(root: Any) -> None:
     """Dim the shape once the parameters have changed, and bend the unit anew as soon as they rest."""
     live = of(root)
@@ -171,6 +171,7 @@ def _changed(root: Any) -> None:
         place(root)
 
 
+@connected(PRESSED)
 def _pressed(root: Any) -> None:
     """Bend the shape to another pressure; beyond its largest one it is computed again."""
     live = of(root)
@@ -183,6 +184,7 @@ def _pressed(root: Any) -> None:
         _tick_soon()
 
 
+@connected(COLOURED)
 def _coloured(root: Any) -> None:
     """Show the chosen colours; a field that was not found yet is asked for."""
     live, wanted = of(root), root.mu_live.colour != PLAIN
@@ -197,10 +199,11 @@ def _coloured(root: Any) -> None:
 
 
 def _tick_soon() -> None:
-    if not bpy.app.background and not bpy.app.timers.is_registered(_tick):
-        bpy.app.timers.register(_tick, first_interval=TICK_S, persistent=True)
+    if not bpy.app.background:
+        _tick.soon(TICK_S)
 
 
+@timer(lasts=True)
 def _tick() -> float | None:
     for uuid, live in list(_every.items()):
         root = unit_object.by_uuid(uuid)
@@ -290,12 +293,12 @@ def _answered(root: Any, live: Live) -> bool:
 
 def _shape(root: Any, motion: Motion, answer: dict[str, Any], design: str) -> Shape:
     cut = bool(root.mu_unit.cut and motion.halved)
-    vertices, triangles, fields = {}, {}, {}
-    for region in REGIONS:
-        skin = motion.skin(region, cut)
-        moved = skin.of_nodes(motion.mesh.nodes) + skin.of_nodes(motion.model_a)
-        vertices[region], triangles[region] = moved.astype(np.float32), skin.triangles
-        fields[region] = {name: skin.of_surface(v) for name, v in motion.fields[region].items()}
+    vertices, triangles = bodies.of_motion(motion, cut)
+    skins = {region: motion.skin(region, cut) for region in REGIONS}
+    fields = {
+        region: {name: skin.of_surface(v) for name, v in motion.fields[region].items()}
+        for region, skin in skins.items()
+    }
     pressure, angle = np.array(answer["states"]).T
     fields = fields if any(fields.values()) else {}
     return Shape(
@@ -318,16 +321,9 @@ def place(root: Any) -> None:
     live = of(root)
     if live is None or live.shape is None:
         return
-    there = {part[LIVE]: part for part in parts(root)}
-    for region in REGIONS:
-        triangles, part = live.shape.triangles[region], there.get(region)
-        if part is None:
-            part = displays.add(root, LIVE, region, bpy.data.meshes.new(f"Live {region}"))
-            displays.lock(part)
-            part.hide_viewport = part.hide_render = True
-        if part.data.get("mu_triangles") != len(triangles):
-            skeletons.write(part.data, skeletons.Skeleton(live.shape.vertices[region][0], faces=(triangles,)))
-            part.data["mu_triangles"] = len(triangles)
+    first = {region: vertices[0] for region, vertices in live.shape.vertices.items()}
+    for part in bodies.put(root, LIVE, "Live", first, live.shape.triangles):
+        part.hide_viewport = part.hide_render = True
     pose(root, live)
     _seen(root, True)
 
@@ -342,10 +338,8 @@ def pose(root: Any, live: Live) -> None:
     ends = shape.ends(field) if shape is live.current else None
     for part in parts(root):
         region = part[LIVE]
-        now = _mean(share, shape.vertices[region])
-        if len(part.data.vertices) != len(now):
+        if not bodies.move(part, _mean(share, shape.vertices[region])):
             continue
-        part.data.attributes["position"].data.foreach_set("vector", np.ascontiguousarray(now).ravel())
         if ends is not None:
             values = _mean(share, shape.fields[region][field])
             colours.coloured(root, part, field, values, ends)
@@ -374,7 +368,7 @@ def _seen(root: Any, seen: bool) -> None:
     unit_object.show(root)
 
 
-@persistent
+@handler(*RESTORED)
 def _restored(*_: Any) -> None:
     """After undo, redo or load: hide shapes of another design or without a process."""
     for root in unit_object.roots():
@@ -388,31 +382,14 @@ def _restored(*_: Any) -> None:
             place(root)
 
 
+@connected(start_child.JOB_ENDED)
 def _job_ended(_key: str) -> None:
     if _every:
         _tick_soon()
 
 
-_HANDLERS = dict.fromkeys(("undo_post", "redo_post", "load_post"), _restored)
-_CONNECTIONS = (
-    (SWITCHED, _switched),
-    (PRESSED, _pressed),
-    (COLOURED, _coloured),
-    (unit_object.REBUILT, _changed),
-    (start_child.JOB_ENDED, _job_ended),
-)
-
-
-def register() -> None:
-    """Register handlers and the signals that bend a unit again."""
-    add_handlers(_HANDLERS, _CONNECTIONS)
-
-
-def unregister() -> None:
-    """Unregister them, and end every process."""
-    remove_handlers(_HANDLERS, _CONNECTIONS)
-    if bpy.app.timers.is_registered(_tick):
-        bpy.app.timers.unregister(_tick)
+@at_end
+def _end_all() -> None:
     for live in _every.values():
         live.end()
         with suppress(OSError):

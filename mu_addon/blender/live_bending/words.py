@@ -8,7 +8,8 @@ import bpy
 
 from ..jobs import start_child
 from ..results import field_colours, legend
-from ..shared.viewports import Overlay
+from ..shared.panels import plain_row
+from ..shared.registration import overlay
 from ..unit import object as unit_object
 from . import state
 
@@ -19,17 +20,14 @@ LEAST_DEG = 0.1
 
 def draw(layout: Any, root: Any) -> None:
     """Draw the switch, the slider next to it, and the result, with the same height in every state."""
-    row = layout.row(align=True)
-    row.use_property_split = False
+    row = plain_row(layout)
     row.prop(root.mu_live, "on", toggle=True, icon="MOD_SIMPLEDEFORM", text="Bend")
     right = row.row(align=True)
     right.active = root.mu_live.on
     right.prop(root.mu_live, "pressure_kPa", text="kPa", slider=True)
     if root.mu_live.on:
         layout.label(text=words(root), icon="MOD_SIMPLEDEFORM")
-        row = layout.row(align=True)
-        row.use_property_split = False
-        row.prop(root.mu_live, "colour", expand=True)
+        plain_row(layout).prop(root.mu_live, "colour", expand=True)
 
 
 def words(root: Any) -> str:
@@ -54,6 +52,7 @@ def words(root: Any) -> str:
     return f"{angle:.1f} ± {error:.1f}° at {kPa:.4g} kPa, refining"
 
 
+@overlay
 def _draw() -> None:
     root = unit_object.active_root(bpy.context)
     live = None if root is None else state.of(root)
@@ -67,7 +66,3 @@ def _draw() -> None:
         place = place if legend.subject(bpy.context) is None else place.beside(BESIDE)
         legend.field_ramp(root, ends, place)
         legend.above([field_colours.BY_NAME[root.mu_live.colour].title], place)
-
-
-_overlay = Overlay(_draw)
-register, unregister = _overlay.register, _overlay.unregister

@@ -6,18 +6,17 @@ A node added to the core appears with its sockets, fields, bounds and tooltips w
 # Blender reads the annotations themselves: no `from __future__ import annotations` here.
 
 import bpy
-from bpy.props import BoolProperty, EnumProperty, FloatProperty, PointerProperty, StringProperty
+from bpy.props import BoolProperty, PointerProperty, StringProperty
 
-from ...graph.definition import FILE, FOLDER, Definition, Setting
+from ...graph.definition import FOLDER, Definition, Setting
 from ...graph.evaluation import BLOCKED, CACHED, COMPUTED, FAILED, MADE, MUTED, WAITING
 from ...run.progress import spell
 from ...usecases.graph.definitions import definitions
-from ..shared.blender_property import blender_property
+from ..shared.blender_property import blender_property, path_property
 from ..shared.panels import wrapped
 from ..shared.updates import Signal
 from ..shared.wording import label, sentence, tooltip
 from ..unit.fields import field, tied_update
-from ..unit.properties import BESIDE_BLEND_FILE
 from . import sockets
 
 TREE = "MuNodeTree"
@@ -75,11 +74,10 @@ class MuNodeTree(bpy.types.NodeTree):
     bl_icon = "OUTLINER_OB_LATTICE"
 
     mu_uuid: StringProperty(options={"HIDDEN"})
-    mu_folder: StringProperty(
-        name="Folder",
-        description="Folder of this tree's runs. Empty: beside the .blend file, or the user's folder",
-        subtype="DIR_PATH",
-        options=BESIDE_BLEND_FILE,
+    mu_folder: path_property(
+        "Folder",
+        "Folder of this tree's runs. Empty: beside the .blend file, or the user's folder",
+        folder=True,
     )
     mu_reports: BoolProperty(
         name="Reports of All Runs", description="Write the full report of every run within the tree, too"
@@ -226,59 +224,32 @@ def draw_state(node, layout) -> None:
 
 
 def _property(s: Setting):
-    """Blender property of a setting."""
-    d = s.description
-    if d.type is str and not d.choices:
-        paths = {FILE: "FILE_PATH", FOLDER: "DIR_PATH"}
-        return StringProperty(
-            name=label(d),
-            description=sentence(d.text),
-            default=d.default,
-            subtype=paths.get(s.path, "NONE"),
-            options=BESIDE_BLEND_FILE if s.path else {"ANIMATABLE"} if s.shown else {"HIDDEN"},
-            update=_changed,
-        )
-    if d.choices:
-        items = [(name, name.replace("_", " "), sentence(d.text)) for name in d.choices]
-        return EnumProperty(
-            name=label(d), description=sentence(d.text), items=items, default=d.default, update=_changed
-        )
-    if d.type is float:
-        # Lengths stay in millimetres, whatever unit a scene has: the tree belongs to no scene.
-        unit = f" ({d.unit})" if d.unit and f"({d.unit})" not in label(d) else ""
-        return FloatProperty(
-            name=label(d) + unit,
-            description=tooltip(d) if d.source else sentence(d.text),
-            default=d.default,
-            min=d.low,
-            max=d.high,
-            precision=3 if d.high < 1000 else 2,
-            step=10 if d.high > 20 else 1,
-            # The same coupling as in the unit's sidebar.
-            update=tied_update(d.name, _changed),
-        )
-    return blender_property(d, _changed)
+    """Blender property of a setting; the parameters of a unit are coupled as in its sidebar."""
+    d, update = s.description, tied_update(s.name, _changed)
+    if s.path:
+        return path_property(label(d), tooltip(d), s.path == FOLDER, default=d.default, update=update)
+    if d.type is not float:
+        items = [(name, name.replace("_", " "), sentence(d.text)) for name in d.choices or ()]
+        return blender_property(d, update, set() if s.shown else {"HIDDEN"}, items=items)
+    # Lengths stay in millimetres, whatever unit a scene has: the tree belongs to no scene.
+    unit = f" ({d.unit})" if d.unit and f"({d.unit})" not in label(d) else ""
+    precision = 3 if d.high < 1000 else 2
+    return blender_property(d, update, name=label(d) + unit, subtype="NONE", precision=precision)
 
 
 def _annotations(definition: Definition) -> dict:
     found = {attribute(s): _property(s) for s in definition.settings}
     if any(not s.shown for s in definition.settings):
-        found["source"] = PointerProperty(
-            name="Unit in the Scene",
-            description="Take this unit, as its sidebar has it, in place of preset and file",
-            type=bpy.types.Object,
-            poll=_is_unit,
-            update=_changed,
-        )
+        text = "Take this unit, as its sidebar has it, in place of preset and file"
+        found["source"] = _unit_of_scene("Unit in the Scene", text)
     if any(o.type == "unit" for o in definition.outputs):
-        found["follower"] = PointerProperty(
-            name="Show On",
-            description="Unit in the scene that takes on every change of this node's unit",
-            type=bpy.types.Object,
-            poll=_is_unit,
-            update=_changed,
-        )
+        text = "Unit in the scene that takes on every change of this node's unit"
+        found["follower"] = _unit_of_scene("Show On", text)
     return found
+
+
+def _unit_of_scene(name: str, text: str):
+    return PointerProperty(name=name, description=text, type=bpy.types.Object, poll=_is_unit, update=_changed)
 
 
 def _class(definition: Definition) -> type:
@@ -313,7 +284,4 @@ class MU_NT_group(_Node, bpy.types.NodeCustomGroup):
         draw_state(self, layout)
 
 
-CLASSES = (MuNodeTree, *map(_class, definitions().values()), MU_NT_group)
-
-
-register, unregister = bpy.utils.register_classes_factory(CLASSES)
+CLASSES = (*map(_class, definitions().values()),)

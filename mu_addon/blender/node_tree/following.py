@@ -17,6 +17,7 @@ from ...design.steps import STEPS
 from ...graph.definition import Setting
 from ..shared import updates
 from ..shared.blender_property import exact
+from ..shared.registration import connected
 from ..shared.wording import label
 from ..unit import object as unit_object
 from ..unit.fields import description
@@ -53,6 +54,7 @@ def agree(root: Any) -> None:
     _agreed[root.mu_unit.uuid] = _values(root.mu_unit)
 
 
+@connected(unit_object.REBUILT)
 def give_back(root: Any) -> bool:
     """Write changes of the sidebar into the nodes that a unit follows; return True if there were any."""
     node, before = followed(root), _agreed.get(root.mu_unit.uuid)

@@ -6,6 +6,8 @@ import bpy
 from bpy.props import StringProperty
 
 from ...errors import InputError
+from ..shared.operators import operator
+from ..shared.registration import at_end, at_start
 from ..unit.base_classes import UnitOperator
 from . import conversion
 from .classes import GROUP, TREE, attribute
@@ -23,6 +25,7 @@ class TreeOperator(UnitOperator):
 
     find_root = staticmethod(active_tree)
     no_root = "Open a node tree of the kind Monolithic Unit in a node editor"
+    root_name = "tree"
     linked_too = True
 
 
@@ -140,48 +143,33 @@ def _socket(found, identifier):
     return next(s for s in found if s.identifier == identifier)
 
 
-class MU_OT_node_group_make(TreeOperator, bpy.types.Operator):
+@operator(TreeOperator, "Make Group")
+def node_group_make(tree):
     """Make a group of the selected nodes"""
-
-    bl_idname = "mu.node_group_make"
-    bl_label = "Make Group"
-    bl_options = {"REGISTER", "UNDO"}
-
-    def act(self, context, tree):
-        make_group(tree, [node for node in tree.nodes if node.select])
+    make_group(tree, [node for node in tree.nodes if node.select])
 
 
-class MU_OT_node_group_ungroup(TreeOperator, bpy.types.Operator):
+@operator(TreeOperator, "Ungroup")
+def node_group_ungroup(tree):
     """Put the nodes of the selected groups back into the tree"""
-
-    bl_idname = "mu.node_group_ungroup"
-    bl_label = "Ungroup"
-    bl_options = {"REGISTER", "UNDO"}
-
-    def act(self, context, tree):
-        for node in [n for n in tree.nodes if n.select and n.bl_idname == GROUP]:
-            take_apart(tree, node)
+    for node in [n for n in tree.nodes if n.select and n.bl_idname == GROUP]:
+        take_apart(tree, node)
 
 
-class MU_OT_node_group_edit(TreeOperator, bpy.types.Operator):
+@operator(
+    TreeOperator,
+    "Edit Group",
+    undo=False,
+    node=StringProperty(name="Node", description="Name of the group's node; empty: the active one"),
+)
+def node_group_edit(context, tree, node):
     """Open a group to edit it, or go back to the tree that it is used in"""
-
-    bl_idname = "mu.node_group_edit"
-    bl_label = "Edit Group"
-    bl_options = {"REGISTER"}
-
-    node: StringProperty(name="Node", description="Name of the group's node; empty: the active one")
-
-    def act(self, context, tree):
-        path = context.space_data.path
-        node = tree.nodes.get(self.node) if self.node else tree.nodes.active
-        if node is not None and node.bl_idname == GROUP and node.node_tree is not None:
-            path.append(node.node_tree, node=node)
-        elif len(path) > 1:
-            path.pop()
-
-
-CLASSES = (MU_OT_node_group_make, MU_OT_node_group_ungroup, MU_OT_node_group_edit)
+    path = context.space_data.path
+    node = tree.nodes.get(node) if node else tree.nodes.active
+    if node is not None and node.bl_idname == GROUP and node.node_tree is not None:
+        path.append(node.node_tree, node=node)
+    elif len(path) > 1:
+        path.pop()
 
 
 _KEYS = (
@@ -192,12 +180,10 @@ _KEYS = (
 """Keys of Blender's own groups, whose operators do not accept trees of other kinds."""
 _keymaps: list = []
 
-_register_classes, _unregister_classes = bpy.utils.register_classes_factory(CLASSES)
 
-
-def register() -> None:
-    """Register operators, and their keys in node editors; in background there are none."""
-    _register_classes()
+@at_start
+def _add_keys() -> None:
+    """Register the keys in node editors; in background there are none."""
     config = bpy.context.window_manager.keyconfigs.addon if bpy.context.window_manager else None
     if config is not None:
         keymap = config.keymaps.new(name="Node Editor", space_type="NODE_EDITOR")
@@ -206,9 +192,8 @@ def register() -> None:
         )
 
 
-def unregister() -> None:
-    """Unregister them."""
+@at_end
+def _remove_keys() -> None:
     for keymap, item in _keymaps:
         keymap.keymap_items.remove(item)
     _keymaps.clear()
-    _unregister_classes()

@@ -11,11 +11,12 @@ from ...errors import InputError
 from ...files import write_text
 from ...graph.tree import with_absolute_paths
 from ...graph.tree_file import read_tree, tree_text
+from ...usecases.graph import templates
 from ...usecases.graph.definitions import definitions
-from ...usecases.graph.templates import template, template_names
 from ..jobs import start_child
 from ..jobs.operators import job_operators
-from ..shared.operators import open_file, reports_errors
+from ..shared.blender_property import listed
+from ..shared.operators import FreeOperator, open_file, operator, reports_errors
 from ..shared.wording import sentence
 from ..unit.base_classes import UnitOperator
 from . import conversion, following, state
@@ -60,60 +61,47 @@ class _TreeOperator(TreeOperator):
     find_root = staticmethod(root_tree)
 
 
-class MU_OT_tree_evaluate(_TreeOperator, bpy.types.Operator):
+def _tree_evaluate_trouble(tree):
+    return "This tree is being evaluated" if state.RUN.is_running(tree) else start_child.lacking()
+
+
+@operator(
+    _TreeOperator,
+    "Evaluate",
+    undo=False,
+    trouble=_tree_evaluate_trouble,
+    node=StringProperty(name="Node", description="Evaluate this node and its sources; empty: all"),
+)
+def tree_evaluate(context, tree, node):
     """Evaluate the tree in a separate process; finished nodes are not repeated, and Blender stays usable"""
-
-    bl_idname = "mu.tree_evaluate"
-    bl_label = "Evaluate"
-    bl_options = {"REGISTER"}
-
-    node: StringProperty(name="Node", description="Evaluate this node and its sources; empty: all")
-
-    @classmethod
-    def trouble(cls, tree):
-        return "This tree is being evaluated" if state.RUN.is_running(tree) else start_child.lacking()
-
-    def act(self, context, tree):
-        state.refresh(tree)
-        if state.show_units(context, tree):
-            bpy.ops.ed.undo_push(message="Units of the Tree")
-        state.start(tree, (self.node,) if self.node else ())
+    state.refresh(tree)
+    if state.show_units(context, tree):
+        bpy.ops.ed.undo_push(message="Units of the Tree")
+    state.start(tree, (node,) if node else ())
 
 
-class MU_OT_tree_new(bpy.types.Operator):
-    """Add a node tree made from a template"""
+def _templates() -> list[tuple[str, str, str]]:
+    names = sorted(templates.template_names(), key=lambda name: [*_TEXTS, name].index(name))
+    return [(n, sentence(n.replace("-", " ")), _TEXTS.get(n, n)) for n in names]
 
-    bl_idname = "mu.tree_new"
-    bl_label = "New from Template"
-    bl_options = {"REGISTER", "UNDO"}
 
-    template: EnumProperty(
+@operator(
+    FreeOperator,
+    "New from Template",
+    template=EnumProperty(
         name="Template",
         description="Initial nodes of the tree",
-        items=lambda self, context: _items(),
-    )
-
-    @reports_errors
-    def execute(self, context):
-        _open(context, conversion.from_tree(template(self.template)))
-        return {"FINISHED"}
-
-
-_template_items: list = []
-
-
-def _items():
-    # Blender keeps no reference to the texts of items.
-    if not _template_items:
-        names = sorted(template_names(), key=lambda name: [*_TEXTS, name].index(name))
-        _template_items.extend((n, sentence(n.replace("-", " ")), _TEXTS.get(n, n)) for n in names)
-    return _template_items
+        items=listed(_templates),
+    ),
+)
+def tree_new(context, template):
+    """Add a node tree made from a template"""
+    _open(context, conversion.from_tree(templates.template(template)))
 
 
 class MU_OT_tree_load(bpy.types.Operator):
     """Open a node tree's file, as `headless/run.py graph` reads it"""
 
-    bl_idname = "mu.tree_load"
     bl_label = "Open Tree File"
     bl_options = {"REGISTER", "UNDO"}
 
@@ -134,7 +122,6 @@ class MU_OT_tree_load(bpy.types.Operator):
 class MU_OT_tree_save(_TreeOperator, bpy.types.Operator):
     """Write the tree to a file for `headless/run.py graph`; groups are written as their nodes"""
 
-    bl_idname = "mu.tree_save"
     bl_label = "Save Tree File"
     bl_options = {"REGISTER"}
 
@@ -158,9 +145,7 @@ class MU_OT_tree_save(_TreeOperator, bpy.types.Operator):
 class MU_OT_tree_of_unit(UnitOperator, bpy.types.Operator):
     """Add a tree with the active unit: its sidebar and the tree's node show the same fields"""
 
-    bl_idname = "mu.tree_of_unit"
     bl_label = "Tree of the Active Unit"
-    bl_options = {"REGISTER", "UNDO"}
 
     steps: BoolProperty(
         name="Steps",
@@ -176,26 +161,21 @@ class MU_OT_tree_of_unit(UnitOperator, bpy.types.Operator):
         show(context, tree)
 
 
-class MU_OT_tree_show(UnitOperator, bpy.types.Operator):
+@operator(UnitOperator, "Show the Tree", undo=False)
+def tree_show(context, root):
     """Show the tree that the unit follows in a node editor; fields of the sidebar are fields of its nodes"""
-
-    bl_idname = "mu.tree_show"
-    bl_label = "Show the Tree"
-    bl_options = {"REGISTER"}
-
-    def act(self, context, root):
-        node = following.followed(root)
-        if node is None:
-            raise InputError(
-                "the unit follows no tree",
-                root.name,
-                "use Tree of the Active Unit in a node editor, with Steps",
-            )
-        tree = node.id_data
-        tree.nodes.active = node
-        if not bpy.app.background:
-            space = _node_editor(context)
-            space.tree_type, space.node_tree = TREE, tree
+    node = following.followed(root)
+    if node is None:
+        raise InputError(
+            "the unit follows no tree",
+            root.name,
+            "use Tree of the Active Unit in a node editor, with Steps",
+        )
+    tree = node.id_data
+    tree.nodes.active = node
+    if not bpy.app.background:
+        space = _node_editor(context)
+        space.tree_type, space.node_tree = TREE, tree
 
 
 def _node_editor(context):
@@ -209,14 +189,11 @@ def _node_editor(context):
     return areas[0].spaces.active
 
 
-class MU_OT_node_open(_TreeOperator, bpy.types.Operator):
-    """Open the results of the active node's run: its report, its folder or its table"""
-
-    bl_idname = "mu.node_open"
-    bl_label = "Open"
-    bl_options = {"REGISTER"}
-
-    what: EnumProperty(
+@operator(
+    _TreeOperator,
+    "Open",
+    undo=False,
+    what=EnumProperty(
         name="What",
         description="What to open",
         items=[
@@ -224,35 +201,17 @@ class MU_OT_node_open(_TreeOperator, bpy.types.Operator):
             ("report", "Report", "Report of the node's run, where it was written"),
             ("table", "Table", "Table of a comparison, as a text in Blender"),
         ],
-    )
-
-    def act(self, context, tree):
-        node = active_tree(context).nodes.active
-        path = state.place_of(tree, node, self.what) if node is not None else None
-        if path is None or not path.exists():
-            raise InputError(
-                "there is nothing to open yet", str(path or ""), "evaluate the tree; reports are an option"
-            )
-        open_file(context, path)
-
-
-CLASSES = (
-    MU_OT_tree_evaluate,
-    MU_OT_tree_new,
-    MU_OT_tree_load,
-    MU_OT_tree_save,
-    MU_OT_tree_of_unit,
-    MU_OT_tree_show,
-    MU_OT_node_open,
-    *job_operators(
-        state.RUN,
-        "tree_",
-        "evaluation",
-        kept="finished nodes are kept, and the next evaluation continues from there",
-        first="evaluate the tree first",
-        base=_TreeOperator,
     ),
 )
+def node_open(context, tree, what):
+    """Open the results of the active node's run: its report, its folder or its table"""
+    node = active_tree(context).nodes.active
+    path = state.place_of(tree, node, what) if node is not None else None
+    if path is None or not path.exists():
+        raise InputError(
+            "there is nothing to open yet", str(path or ""), "evaluate the tree; reports are an option"
+        )
+    open_file(context, path)
 
 
-register, unregister = bpy.utils.register_classes_factory(CLASSES)
+CLASSES = job_operators(state.RUN, "evaluate the tree first", base=_TreeOperator)

@@ -6,8 +6,9 @@ import bpy
 
 from ...graph.evaluation import MADE
 from ...usecases.graph.definitions import definitions
-from ..jobs.panel import job_state, start_button, whole
+from ..jobs.panel import draw_job, open_buttons, whole
 from ..shared.panels import wrapped
+from ..shared.registration import menu
 from . import classes, state
 from .classes import GROUP, TREE
 from .operators import root_tree
@@ -31,7 +32,6 @@ class _Panel:
 class MU_PT_tree(_Panel, bpy.types.Panel):
     """Evaluation of the tree, its folder and its file"""
 
-    bl_idname = "MU_PT_tree"
     bl_label = "Node Tree"
 
     def draw(self, context):
@@ -42,12 +42,9 @@ class MU_PT_tree(_Panel, bpy.types.Panel):
             layout.operator("mu.tree_load", icon="FILE_FOLDER")
             _of_unit(layout)
             return
-        child = state.RUN.child(tree)
-        start_button(layout, child, "mu.tree_evaluate", "PLAY")
-        job_state(layout, child, "see the nodes, and the scene for their units", "tree_")
-        row = layout.row(align=True)
-        for what in ("report", "folder"):
-            row.operator("mu.tree_open", text=what.capitalize()).what = what
+        where = "see the nodes, and the scene for their units"
+        draw_job(layout, tree, state.RUN, "mu.tree_evaluate", "PLAY", "Evaluate", where=where)
+        open_buttons(layout, state.RUN)
         column = layout.column()
         column.use_property_split = True
         column.prop(tree, "mu_folder")
@@ -70,7 +67,6 @@ def _of_unit(layout) -> None:
 class MU_PT_node(_Panel, bpy.types.Panel):
     """The active node: its kind, its state, its results"""
 
-    bl_idname = "MU_PT_node"
     bl_label = "Active Node"
 
     @classmethod
@@ -120,7 +116,6 @@ MENUS = tuple(map(_menu, CATEGORIES))
 class MU_MT_nodes_group(bpy.types.Menu):
     """Groups of nodes"""
 
-    bl_idname = "MU_MT_nodes_group"
     bl_label = "Group"
 
     def draw(self, context):
@@ -140,7 +135,6 @@ class MU_MT_nodes_group(bpy.types.Menu):
 class MU_MT_nodes_layout(bpy.types.Menu):
     """Frames and reroutes"""
 
-    bl_idname = "MU_MT_nodes_layout"
     bl_label = "Layout"
 
     def draw(self, context):
@@ -148,14 +142,16 @@ class MU_MT_nodes_layout(bpy.types.Menu):
             _entry(self.layout, name, kind)
 
 
+@menu("NODE_MT_add")
 def _add(self, context):
     if _shows_tree(context):
-        for menu in (*MENUS, MU_MT_nodes_group, MU_MT_nodes_layout):
-            self.layout.menu(menu.bl_idname)
+        for listed in (*MENUS, MU_MT_nodes_group, MU_MT_nodes_layout):
+            self.layout.menu(listed.bl_idname)
         self.layout.separator()
         self.layout.operator_menu_enum("mu.tree_new", "template", text="Template")
 
 
+@menu("NODE_HT_header")
 def _header(self, context):
     if not _shows_tree(context):
         return
@@ -172,21 +168,4 @@ def _header(self, context):
         row.operator("mu.tree_evaluate", icon="PLAY")
 
 
-CLASSES = (MU_PT_tree, MU_PT_node, *MENUS, MU_MT_nodes_group, MU_MT_nodes_layout)
-
-
-_register_classes, _unregister_classes = bpy.utils.register_classes_factory(CLASSES)
-
-
-def register() -> None:
-    """Register panels and menus, the entries in the editor's Add menu and header."""
-    _register_classes()
-    bpy.types.NODE_MT_add.append(_add)
-    bpy.types.NODE_HT_header.append(_header)
-
-
-def unregister() -> None:
-    """Unregister them."""
-    bpy.types.NODE_HT_header.remove(_header)
-    bpy.types.NODE_MT_add.remove(_add)
-    _unregister_classes()
+CLASSES = (*MENUS,)

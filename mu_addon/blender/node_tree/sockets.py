@@ -106,6 +106,3 @@ def _interface_class(type_: str) -> Any:
 
 
 CLASSES = tuple(made(type_) for type_ in _types() for made in (_class, _interface_class))
-
-
-register, unregister = bpy.utils.register_classes_factory(CLASSES)

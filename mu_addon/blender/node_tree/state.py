@@ -8,13 +8,12 @@ from __future__ import annotations
 
 import time
 import uuid
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
 import attrs
 import bpy
-from bpy.app.handlers import persistent
 
 from ...errors import InputError, MuError
 from ...graph.evaluation import FAILED, Evaluation, Kept, Record, State
@@ -30,7 +29,7 @@ from ...usecases.graph.templates import steps_of
 from ..jobs.start_child import INTERVAL_S, JOB_ENDED, JobKind
 from ..shared import landing, viewports
 from ..shared.file_cache import FileCache
-from ..shared.registration import add_handlers, remove_handlers
+from ..shared.registration import RESTORED, at_end, connected, handler, timer
 from ..simulate.study_folder import default_folder, relative
 from ..unit import object as unit_object
 from ..unit.properties import PARAMETERS_CHANGED, to_unit
@@ -78,7 +77,7 @@ def _number(tree: Any) -> str:
     return str(tree.mu_uuid)
 
 
-RUN = JobKind("graph", uuid_of, folder_of, outlives=True)
+RUN = JobKind("graph", uuid_of, folder_of, "evaluation", outlives=True, prefix="tree_")
 """The evaluation of a tree."""
 
 
@@ -152,8 +151,6 @@ def show_units(context: Any, tree: Any) -> list[Any]:
         after = (link.to_node for out in node.outputs for link in out.links)
         if any(hasattr(other, "follower") and other.name in designs for other in after):
             continue
-        if context.mode != "OBJECT":
-            bpy.ops.object.mode_set(mode="OBJECT")
         root = unit_object.create(context, design.unit)
         root.mu_unit.path = design.path
         landing.land(context, root)
@@ -176,13 +173,14 @@ def _keep_reachable(tree: Any) -> None:
         scene[SCENE_KEY] = wanted
 
 
+@connected(CHANGED)
 def schedule(tree: Any) -> None:
     """Schedule a refresh of a tree, to run after Blender has finished the present change."""
     _pending.add(tree.session_uid)
-    if not bpy.app.timers.is_registered(_refresh_pending):
-        bpy.app.timers.register(_refresh_pending, first_interval=WAIT_S)
+    _refresh_pending.soon(WAIT_S)
 
 
+@timer()
 def _refresh_pending() -> None:
     pending = set(_pending)
     _pending.clear()
@@ -219,11 +217,11 @@ def start(tree: Any, wanted: tuple[str, ...] = ()) -> Any:
     expected = plan_of(job.tree, _states.get(tree.session_uid, {}), wanted, folder)
     kind = attrs.evolve(RUN, plan_of=lambda _: expected)
     child = kind.start(tree, folder, lambda place: write_run(place, LAYOUT, job.texts()))
-    if not bpy.app.timers.is_registered(_redraw_running):
-        bpy.app.timers.register(_redraw_running, first_interval=INTERVAL_S, persistent=True)
+    _redraw_running.soon(INTERVAL_S)
     return child
 
 
+@timer(lasts=True)
 def _redraw_running() -> float | None:
     """Show the running node, and those finished since."""
     running = [tree for tree in trees() if RUN.is_running(tree)]
@@ -273,6 +271,7 @@ def place_of(tree: Any, node: Any, what: str) -> Path | None:
     return found.folder / "report.html" if what == "report" else found.folder
 
 
+@connected(PARAMETERS_CHANGED)
 def _of_object(root: Any) -> None:
     """Refresh the trees that show a unit of the scene."""
     for tree in trees():
@@ -280,20 +279,21 @@ def _of_object(root: Any) -> None:
             schedule(tree)
 
 
+@connected(JOB_ENDED)
 def _job_ended(key: str) -> None:
     for tree in trees():
         if RUN.key(tree) == key:
             schedule(tree)
 
 
-@persistent
+@handler(*RESTORED)
 def _all(*_: Any) -> None:
     following.forget()
     for tree in trees():
         schedule(tree)
 
 
-@persistent
+@handler("frame_change_post", "depsgraph_update_post")
 def _driven(scene: Any, *_: Any) -> None:
     """Refresh the trees with drivers or animation, whose values may have changed."""
     now = time.monotonic()
@@ -307,30 +307,7 @@ def _driven(scene: Any, *_: Any) -> None:
             schedule(tree)
 
 
-_HANDLERS: dict[str, Callable[..., Any]] = dict.fromkeys(("undo_post", "redo_post", "load_post"), _all)
-_DRIVEN: dict[str, Callable[..., Any]] = dict.fromkeys(
-    ("frame_change_post", "depsgraph_update_post"), _driven
-)
-_CONNECTIONS = (
-    (CHANGED, schedule),
-    (PARAMETERS_CHANGED, _of_object),
-    (unit_object.REBUILT, following.give_back),
-    (JOB_ENDED, _job_ended),
-)
-
-
-def register() -> None:
-    """Register handlers and signals that start a refresh."""
-    add_handlers(_HANDLERS, _CONNECTIONS)
-    add_handlers(_DRIVEN)
-
-
-def unregister() -> None:
-    """Unregister them, and cancel a waiting refresh."""
-    remove_handlers(_DRIVEN)
-    remove_handlers(_HANDLERS, _CONNECTIONS)
-    for timer in (_refresh_pending, _redraw_running):
-        if bpy.app.timers.is_registered(timer):
-            bpy.app.timers.unregister(timer)
+@at_end
+def _forget() -> None:
     _pending.clear()
     following.forget()

@@ -13,7 +13,9 @@ from ...design.settings import FRICTION
 from ...errors import InputError
 from ..body.operators import report_flaws, selected_meshes
 from ..preview import materials, skeletons
+from ..shared import viewports
 from ..shared.blender_property import blender_property, exact
+from ..shared.operators import operator, unless
 from ..unit.base_classes import UnitOperator, ValidUnitOperator
 from ..unit.properties import to_unit
 from . import state as obstacles
@@ -28,9 +30,7 @@ class ObstacleOperator(UnitOperator):
         name="Obstacle", description="Name of its object. Empty: all of this unit", options={"SKIP_SAVE"}
     )
 
-    @classmethod
-    def trouble(cls, root):
-        return "" if obstacles.of_unit(root) else NO_OBSTACLE
+    trouble = unless(obstacles.of_unit, NO_OBSTACLE)
 
     def chosen(self, root):
         """Objects to act on; raises InputError for an unknown name."""
@@ -44,66 +44,54 @@ class ObstacleOperator(UnitOperator):
         return chosen
 
 
-class MU_OT_obstacle(ValidUnitOperator, bpy.types.Operator):
+@operator(ValidUnitOperator, "Use as Obstacle", friction=blender_property(FRICTION, precision=2))
+def obstacle(operator, context, root, friction):
     """Make the selected closed meshes obstacles of the unit: rigid, in place, with friction"""
-
-    bl_idname = "mu.obstacle"
-    bl_label = "Use as Obstacle"
-    bl_options = {"REGISTER", "UNDO"}
-
-    friction: blender_property(FRICTION, precision=2)
-
-    def act(self, context, root):
-        core, chosen = to_unit(root.mu_unit), selected_meshes(context)
-        for obj in chosen:
-            body = obstacles.placed(root, obj).body
-            require_sound(body, obstacles.unsound(body), "an obstacle")
-        for obj in chosen:
-            obj.mu_obstacle.unit, obj.mu_obstacle.friction = root.mu_unit.uuid, self.friction
-            # An overlap is only reported, since the obstacle may be moved; a simulation refuses it.
-            for flaw in obstacles.examined(root, obj, core):
-                self.report({"WARNING"}, f"{obj.name}: {flaw.what}: {flaw.remedy}")
+    core, chosen = to_unit(root.mu_unit), selected_meshes(context)
+    for obj in chosen:
+        body = obstacles.placed(root, obj).body
+        require_sound(body, obstacles.unsound(body), "an obstacle")
+    for obj in chosen:
+        obj.mu_obstacle.unit, obj.mu_obstacle.friction = root.mu_unit.uuid, friction
+        # An overlap is only reported, since the obstacle may be moved; a simulation refuses it.
+        for flaw in obstacles.examined(root, obj, core):
+            operator.report({"WARNING"}, f"{obj.name}: {flaw.what}: {flaw.remedy}")
 
 
-class MU_OT_obstacle_box(ValidUnitOperator, bpy.types.Operator):
-    """Add a box as an obstacle, in front of the tip on the side that the unit bends to"""
-
-    bl_idname = "mu.obstacle_box"
-    bl_label = "Add Box"
-    bl_options = {"REGISTER", "UNDO"}
-
-    size: FloatVectorProperty(
+@operator(
+    ValidUnitOperator,
+    "Add Box",
+    size=FloatVectorProperty(
         name="Size (mm)",
         description="Edges of the box in mm",
         subtype="XYZ",
         default=(25.0, 25.0, 25.0),
         min=0.1,
-    )
-    gap: FloatProperty(
+    ),
+    gap=FloatProperty(
         name="Gap (mm)", description="Distance between unit and box in mm", default=5.0, min=0.0
-    )
-    friction: blender_property(FRICTION, precision=2)
-
-    def act(self, context, root):
-        d = to_unit(root.mu_unit).dimensions
-        size = np.array([exact(edge) for edge in self.size])
-        mesh = bpy.data.meshes.new("Obstacle")
-        skeletons.write(mesh, skeletons.box(-size / 2.0, size / 2.0))
-        materials.assign(mesh, "MU Obstacle")
-        obj = bpy.data.objects.new("Obstacle", mesh)
-        context.collection.objects.link(obj)
-        reach = d.bounds[1][1] + exact(self.gap) + 0.5 * float(size[1])
-        obj.matrix_world = root.matrix_world.copy()
-        obj.location = root.matrix_world @ Vector((0.0, reach, d.height - 0.5 * float(size[2])))
-        obj.mu_obstacle.unit, obj.mu_obstacle.friction = root.mu_unit.uuid, self.friction
+    ),
+    friction=blender_property(FRICTION, precision=2),
+)
+def obstacle_box(context, root, size, gap, friction):
+    """Add a box as an obstacle, in front of the tip on the side that the unit bends to"""
+    d = to_unit(root.mu_unit).dimensions
+    size = np.array([exact(edge) for edge in size])
+    mesh = bpy.data.meshes.new("Obstacle")
+    skeletons.write(mesh, skeletons.box(-size / 2.0, size / 2.0))
+    materials.assign(mesh, "MU Obstacle")
+    obj = bpy.data.objects.new("Obstacle", mesh)
+    context.collection.objects.link(obj)
+    reach = d.bounds[1][1] + exact(gap) + 0.5 * float(size[1])
+    obj.matrix_world = root.matrix_world.copy()
+    obj.location = root.matrix_world @ Vector((0.0, reach, d.height - 0.5 * float(size[2])))
+    obj.mu_obstacle.unit, obj.mu_obstacle.friction = root.mu_unit.uuid, friction
 
 
 class MU_OT_obstacle_check(ObstacleOperator, bpy.types.Operator):
     """Check obstacles for open edges, self-intersections, size and overlap; mark the places"""
 
-    bl_idname = "mu.obstacle_check"
     bl_label = "Check Obstacles"
-    bl_options = {"REGISTER", "UNDO"}
 
     def act(self, context, root):
         core, chosen = to_unit(root.mu_unit), self.chosen(root)
@@ -116,9 +104,7 @@ class MU_OT_obstacle_check(ObstacleOperator, bpy.types.Operator):
 class MU_OT_obstacle_remove(ObstacleOperator, bpy.types.Operator):
     """Remove an object from the obstacles; the object stays"""
 
-    bl_idname = "mu.obstacle_remove"
     bl_label = "Remove Obstacle"
-    bl_options = {"REGISTER", "UNDO"}
 
     def act(self, context, root):
         for obj in self.chosen(root):
@@ -128,24 +114,7 @@ class MU_OT_obstacle_remove(ObstacleOperator, bpy.types.Operator):
 class MU_OT_obstacle_select(ObstacleOperator, bpy.types.Operator):
     """Select an obstacle, to move it"""
 
-    bl_idname = "mu.obstacle_select"
     bl_label = "Select Obstacle"
-    bl_options = {"REGISTER", "UNDO"}
 
     def act(self, context, root):
-        for other in context.selected_objects:
-            other.select_set(False)
-        for obj in self.chosen(root):
-            obj.select_set(True)
-
-
-CLASSES = (
-    MU_OT_obstacle,
-    MU_OT_obstacle_box,
-    MU_OT_obstacle_check,
-    MU_OT_obstacle_remove,
-    MU_OT_obstacle_select,
-)
-
-
-register, unregister = bpy.utils.register_classes_factory(CLASSES)
+        viewports.select(context, self.chosen(root))

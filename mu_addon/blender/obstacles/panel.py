@@ -14,7 +14,6 @@ from . import state as obstacles
 class MU_PT_obstacles(UnitPanel, bpy.types.Panel):
     """Rigid bodies that the unit may touch while it moves"""
 
-    bl_idname = "MU_PT_obstacles"
     bl_label = "Obstacles"
     bl_parent_id = "MU_PT_simulate"
 
@@ -46,9 +45,3 @@ def _troubles(root, obj):
     except InputError as error:
         return [f"{error.what}: {error.remedy}"]
     return [f"{sentence(flaw.what)}: {flaw.remedy}" for flaw in known]
-
-
-CLASSES = (MU_PT_obstacles,)
-
-
-register, unregister = bpy.utils.register_classes_factory(CLASSES)

@@ -11,7 +11,6 @@ from typing import Any
 
 import attrs
 import bpy
-from bpy.app.handlers import persistent
 from bpy.props import FloatProperty, StringProperty
 
 from ...design.body import Body, Flaw, flaws, overlaps, require_sound
@@ -20,13 +19,14 @@ from ...design.rigid_body import RigidBody
 from ...design.settings import FRICTION
 from ..body import state as bodies
 from ..shared.blender_property import blender_property, exact
-from ..shared.registration import property_group_factory
+from ..shared.registration import at_end, handler, property_of
 from ..unit import envelope
 
 ODD_SIZE_MM = (0.1, 2000.0)
 """An obstacle outside this range is probably in another unit of length."""
 
 
+@property_of(bpy.types.Object, "mu_obstacle")
 class MU_PG_obstacle(bpy.types.PropertyGroup):
     """An object as an obstacle of a unit."""
 
@@ -116,7 +116,7 @@ def _where(root: Any, obj: Any) -> Any:
     return [tuple(row) for row in root.matrix_world.inverted() @ obj.matrix_world]
 
 
-@persistent
+@handler("depsgraph_update_post")
 def _edited(scene, depsgraph):
     """Drop edited surfaces, to be read again; `placed` itself notices moves."""
     changed = {u.id.name_full for u in depsgraph.updates if u.is_updated_geometry}
@@ -124,23 +124,7 @@ def _edited(scene, depsgraph):
         del _placed[key]
 
 
-@persistent
+@at_end
+@handler("load_post")
 def _loaded(*_):
-    _placed.clear()
-
-
-_HANDLERS = {"depsgraph_update_post": _edited, "load_post": _loaded}
-
-
-_register, _unregister = property_group_factory(bpy.types.Object, "mu_obstacle", (MU_PG_obstacle,), _HANDLERS)
-
-
-def register() -> None:
-    """Register the property on objects, and handlers that notice edits."""
-    _register()
-
-
-def unregister() -> None:
-    """Unregister them; obstacles stay such in the file."""
-    _unregister()
     _placed.clear()

@@ -7,20 +7,17 @@ import re
 import bpy
 
 from ...optimization.freedoms import parameters
+from ...optimization.target_kinds import KINDS
 from ...studies.optimize import FRONT
-from ..jobs.panel import job_state, start_button, timed
+from ..jobs.panel import draw_job, open_buttons, timed
 from ..shared.file_cache import icon_of
-from ..shared.panels import alert, wrapped
+from ..shared.panels import alert, fold, wrapped
 from ..shared.wording import in_panel, label
 from ..unit.base_classes import UnitPanel
 from . import state as optimization
-from .properties import ASKED, AT_PRESSURE, AT_TWO, FREE, NAMED, OF_PATH, YES, asks_curve, present, scale_of
+from .properties import ASKED, FREE, NAMED, conditions, present, scale_of
 
-JOB = "optimize_"
 _KNOWN = parameters()
-UNITS = {"angle": "deg", "stiffness": "N/mm", "air_volume": "ml", "mass": "g", "print_time": "h"}
-UNITS |= {"deviation": "mm", "sensor_slope": "1/deg", "wall_thickness": "mm"}
-UNITS |= {"tip_force": "N", "tip_position": "mm", "workspace": "mm"}
 BARELY = "QUESTION"
 """Sign of a target that is met, but within two standard errors of being missed."""
 LABELS = 0.4
@@ -32,7 +29,6 @@ FRONT_SIZE = 11.0
 class MU_PT_optimize(UnitPanel, bpy.types.Panel):
     """Find units that meet targets within given ranges of parameters"""
 
-    bl_idname = "MU_PT_optimize"
     bl_label = "Optimize"
 
     def show(self, layout, context, root):
@@ -48,9 +44,7 @@ class MU_PT_optimize(UnitPanel, bpy.types.Panel):
             _more(layout, props)
         if root.mu_unit.study.effects:
             wrapped(layout, "With the named effects that the panel Simulate lists", "LIGHT")
-        child = optimization.OPTIMIZATION.child(root)
-        start_button(layout, child, "mu.optimize", "CON_TRACKTO", text=start_words(root))
-        job_state(layout, child, "see below", JOB)
+        draw_job(layout, root, optimization.OPTIMIZATION, "mu.optimize", "CON_TRACKTO", start_words(root))
         found = optimization.findings(root)
         if found is not None and found.outcome:
             _results(layout, found)
@@ -68,8 +62,7 @@ def start_words(root) -> str:
 
 def _more(layout, props) -> None:
     """Draw a fold with seldom changed settings."""
-    header, body = layout.panel("MU_optimize_more", default_closed=True)
-    header.label(text="More")
+    body = fold(layout, "MU_optimize_more", "More")
     if not body:
         return
     body.prop(props, "robust")
@@ -106,16 +99,9 @@ def _targets(layout, props) -> None:
         row.prop(target, "kind", text="")
         _remove(row, "targets", index)
         column = box.column(align=True)
-        if target.kind in AT_PRESSURE and not asks_curve(target):
-            column.prop(target, "pressure_kPa")
-        if target.kind in OF_PATH:
-            column.prop(target, "paths")
-        if target.kind in AT_TWO:
-            column.prop(target, "pressures_kPa")
-        own = {"stiffness": "direction", "tip_position": "toward", "tip_force": "gap_mm"}.get(target.kind)
-        if own:
-            column.prop(target, own)
-        if target.kind in YES:
+        for name in conditions(target).values():
+            column.prop(target, "paths" if name == "path" else name)
+        if KINDS[target.kind].is_yes:
             continue
         column.prop(target, "ask")
         for name in ASKED[target.ask]:
@@ -153,7 +139,7 @@ def _freedoms(layout, root, props) -> None:
 
 def asked_title(target, name: str) -> str:
     """Label next to a field of a target: its name and unit, for a curve the units of a pair."""
-    unit = UNITS.get(target.kind, "")
+    unit = KINDS[target.kind].unit
     if name == "points":
         return f"kPa: {unit or 'value'}"
     title = target.bl_rna.properties[name].name
@@ -167,9 +153,7 @@ def _results(layout, found) -> None:
         alert(box, f"Stands in the way: {name}")
     if found.other_start:
         wrapped(box, "The search started from other parameters than the unit has now", "INFO")
-    row = box.row(align=True)
-    row.operator("mu.optimize_open", text="Report", icon="URL").what = "report"
-    row.operator("mu.optimize_open", text="Folder", icon="FILE_FOLDER").what = "folder"
+    open_buttons(box, optimization.OPTIMIZATION)
     icon = icon_of(found.folder / FRONT)
     if icon is not None:
         layout.template_icon(icon, scale=FRONT_SIZE)
@@ -228,9 +212,3 @@ def target_icon(target) -> str:
     if target["objective"]:
         return "DRIVER_DISTANCE"
     return "CHECKMARK" if target["robust"] else BARELY if target["met"] else "ERROR"
-
-
-CLASSES = (MU_PT_optimize,)
-
-
-register, unregister = bpy.utils.register_classes_factory(CLASSES)

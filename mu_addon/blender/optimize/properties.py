@@ -21,11 +21,12 @@ from ...errors import InputError
 from ...optimization.freedoms import PATH, RESIN, parameters
 from ...optimization.settings import CHECK_REFINE, EVALUATIONS, ROBUST, SELF_CONTACT
 from ...optimization.settings import REFINE as SEARCH_REFINE
-from ..shared.blender_property import blender_property, exact
-from ..shared.registration import property_group_factory
+from ...optimization.target_kinds import GAP, KINDS, PRESSURE
+from ..shared.blender_property import blender_property, exact, path_property
+from ..shared.registration import property_of
 from ..shared.wording import label, sentence
 from ..unit.fields import path_menu, true_scale
-from ..unit.properties import BESIDE_BLEND_FILE, section_of, to_unit
+from ..unit.properties import section_of, to_unit
 
 SECTIONS = ("chambers", "lattice", "grading", "material")
 """Sections whose numbers may be free; those of sensor, printer and laws with history are not offered."""
@@ -44,28 +45,6 @@ NAMED = {
 AROUND = 0.25
 """Share of its value by which a newly freed parameter may first change to either side."""
 
-KINDS = [
-    ("angle", "Angle", "Bending angle under a pressure, in degrees"),
-    ("tip_force", "Tip Force", "Force on a wall next to the tip under a pressure, in N"),
-    ("tip_position", "Tip Position", "Displacement of the tip under a pressure, in mm"),
-    ("workspace", "Workspace", "Length of the tip's path over two pressures and rest, in mm"),
-    ("stiffness", "Stiffness", "Force that moves the tip by 1 mm, the unit at rest, in N/mm"),
-    ("stretch", "Stretch", "Largest principal stretch of the wall under a pressure"),
-    ("safety", "Safety", "The resin's elongation at break over the wall's strain under a pressure"),
-    ("air_volume", "Air", "Air in the chambers under a pressure, in ml"),
-    ("mass", "Mass", "Mass without the waveguide, in g"),
-    ("print_time", "Print Time", "Time of the print, upright, in h"),
-    ("wall_thickness", "Wall Thickness", "Thickness of the thinnest chamber's wall, in mm"),
-    ("deviation", "Deviation by a Path", "Mean deviation that the sensor along a path causes, in mm"),
-    ("sensor_slope", "Slope of the Sensor", "Relative change of the light per degree, along a path"),
-    ("walls_apart", "Walls Apart", "No wall passes through another under a pressure"),
-    ("printable", "Printable", "No error in the print check of a proposed unit"),
-]
-AT_PRESSURE = ("angle", "tip_force", "tip_position", "stretch", "safety", "air_volume", "walls_apart")
-OF_PATH = ("deviation", "sensor_slope")
-AT_TWO = (*OF_PATH, "workspace")
-YES = ("walls_apart", "printable")
-"""Kinds of targets read at one pressure, those of a path, those read at two, those without a number."""
 ASKED = {"low": ("low",), "high": ("high",), "range": ("low", "high"), "value": ("value", "tolerance")}
 ASKED |= {"curve": ("points", "tolerance"), "minimise": (), "maximise": ()}
 """Fields that each way of asking needs."""
@@ -74,23 +53,19 @@ ASKED |= {"curve": ("points", "tolerance"), "minimise": (), "maximise": ()}
 class MU_PG_target(bpy.types.PropertyGroup):
     """One target of a design: a quantity and its goal."""
 
-    kind: EnumProperty(name="Quantity", description="Quantity of the target", items=KINDS)
-    pressure_kPa: FloatProperty(
-        name="At (kPa)",
-        description="Gauge pressure in all chambers; negative: vacuum",
-        default=30.0,
-        min=-500.0,
-        max=500.0,
-        precision=1,
-        step=100,
+    kind: EnumProperty(
+        name="Quantity",
+        description="Quantity of the target",
+        items=[(name, name.replace("_", " ").title(), sentence(kind.text)) for name, kind in KINDS.items()],
     )
+    pressure_kPa: blender_property(PRESSURE, name="At (kPa)", precision=1, step=100)
     pressures_kPa: FloatVectorProperty(
         name="At (kPa)",
         description="Two gauge pressures over which it is taken",
         size=2,
         default=(-15.0, 30.0),
-        min=-500.0,
-        max=500.0,
+        min=PRESSURE.low,
+        max=PRESSURE.high,
         precision=1,
         step=100,
     )
@@ -102,14 +77,7 @@ class MU_PG_target(bpy.types.PropertyGroup):
         description="Direction of the displacement",
         items=[("y", "Y", "Toward which the unit bends"), ("z", "Z", "Along the axis")],
     )
-    gap_mm: FloatProperty(
-        name="Gap (mm)",
-        description="Distance from the tip as drawn to the wall",
-        default=0.0,
-        min=0.0,
-        max=200.0,
-        precision=2,
-    )
+    gap_mm: blender_property(GAP, precision=2)
     points: StringProperty(
         name="Curve",
         description="Pressure in kPa and value of each point, as -15: -10, 30: 16",
@@ -148,7 +116,14 @@ class MU_PG_target(bpy.types.PropertyGroup):
 
 def asks_curve(target) -> bool:
     """Return True if a target is a curve over pressure; never for one without a number."""
-    return bool(target.ask == "curve" and target.kind not in YES)
+    return bool(target.ask == "curve" and not KINDS[target.kind].is_yes)
+
+
+def conditions(target) -> dict[str, str]:
+    """Property of each key that a target's table takes beside its goal; a curve has its own pressures."""
+    own = {"direction": "toward"} if target.kind == "tip_position" else {}
+    left = ("region", *[PRESSURE.name] * asks_curve(target))
+    return {key: own.get(key, key) for key in KINDS[target.kind].takes if key not in left}
 
 
 def _first_range(freedom, context) -> None:
@@ -282,6 +257,7 @@ class MU_PG_freedom(bpy.types.PropertyGroup):
     )
 
 
+@property_of(bpy.types.Object, "mu_optimize")
 class MU_PG_optimize(bpy.types.PropertyGroup):
     """Targets and freedoms of a unit, and settings of the search."""
 
@@ -293,12 +269,7 @@ class MU_PG_optimize(bpy.types.PropertyGroup):
             ("file", "In a File", "Those of a design.toml"),
         ],
     )
-    file: StringProperty(
-        name="File",
-        description="design.toml with targets and freedoms",
-        subtype="FILE_PATH",
-        options=BESIDE_BLEND_FILE,
-    )
+    file: path_property("File", "design.toml with targets and freedoms")
     own_unit: BoolProperty(
         name="Start from This Unit",
         description="The search starts from this unit in place of the one that the file names",
@@ -320,8 +291,3 @@ class MU_PG_optimize(bpy.types.PropertyGroup):
     evaluations: blender_property(EVALUATIONS, name="Units at Most")
     refine: blender_property(SEARCH_REFINE, name="Search Mesh", precision=2, step=5)
     check_refine: blender_property(CHECK_REFINE, name="Check Mesh", precision=2, step=5)
-
-
-register, unregister = property_group_factory(
-    bpy.types.Object, "mu_optimize", (MU_PG_target, MU_PG_freedom, MU_PG_optimize)
-)

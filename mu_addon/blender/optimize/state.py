@@ -14,8 +14,7 @@ from ...design.repairs import tied
 from ...errors import InputError, MuError
 from ...optimization.freedoms import Freedom, changed_unit
 from ...optimization.settings import BODY, DESIGN, HEADER, UNIT
-from ...reading import file_bytes, parse_json
-from ...run.folder import write_run
+from ...optimization.target_kinds import KINDS
 from ...studies.inputs import MODEL
 from ...studies.optimize import Optimize, expected_s
 from ...toml_writer import toml_text
@@ -25,15 +24,13 @@ from ..shared.blender_property import exact
 from ..shared.file_cache import FileCache
 from ..simulate import effects
 from ..simulate import study_folder as studies
+from ..simulate.study_job import StudyJob
 from ..unit import envelope
 from ..unit.properties import shape_hash, to_unit
-from .properties import ASKED, AT_PRESSURE, AT_TWO, FREE, NAMED, OF_PATH, YES, asks_curve
+from .properties import ASKED, FREE, NAMED, asks_curve, conditions
 
 FOLDER = "optimize"
 """Folder of the optimisation in the unit's study folder."""
-SUMMARY = "summary.json"
-
-
 TARGET_KEYS = ("name", "asked", "unit", "value", "objective", "met", "robust")
 
 
@@ -92,34 +89,36 @@ def plan_of(root: Any) -> list[tuple[str, float]]:
 
 
 OPTIMIZATION = JobKind(
-    FOLDER, lambda root: root.mu_unit.uuid, folder_of, "optimisation", heavy=True, plan_of=plan_of
+    FOLDER,
+    lambda root: root.mu_unit.uuid,
+    folder_of,
+    "optimisation",
+    heavy=True,
+    plan_of=plan_of,
+    prefix="optimize_",
 )
 
 
 def target_table(target: Any) -> dict[str, Any]:
     """A target of the panel as its [[target]] table."""
-    table: dict[str, Any] = {"kind": target.kind}
-    if target.kind in OF_PATH and target.path:
-        table["path"] = target.path
-    if target.kind in AT_TWO:
-        table["pressures_kPa"] = [exact(p) for p in target.pressures_kPa]
-    if target.kind == "stiffness":
-        table["direction"] = target.direction
-    elif target.kind == "tip_position":
-        table["direction"] = target.toward
-    elif target.kind == "tip_force":
-        table["gap_mm"] = exact(target.gap_mm)
-    curve = asks_curve(target)
-    if target.kind in AT_PRESSURE and not curve:
-        table["pressure_kPa"] = exact(target.pressure_kPa)
-    if target.kind in YES:
+    given = {key: getattr(target, name) for key, name in conditions(target).items()}
+    # A path that is searched for is left out.
+    table = {"kind": target.kind} | {key: _plain(value) for key, value in given.items() if value != ""}
+    if KINDS[target.kind].is_yes:
         return table
-    if curve:
+    if asks_curve(target):
         points = [_numbers(pair, ":") for pair in target.points.split(",")]
         return table | {"points": points, "tolerance": exact(target.tolerance)}
     keys = ASKED[target.ask]
     asked = {key: exact(getattr(target, key)) for key in keys}
     return table | (asked if keys else {"objective": target.ask})
+
+
+def _plain(value: Any) -> Any:
+    """A property's value for a file: numbers by their shortest decimals."""
+    if isinstance(value, str):
+        return value
+    return exact(value) if isinstance(value, float) else [exact(v) for v in value]
 
 
 def _numbers(text: str, between: str) -> list[Any]:
@@ -173,20 +172,28 @@ def document(root: Any) -> dict[str, Any]:
     }
 
 
-def job_of(root: Any) -> Optimize:
-    """Optimisation job from a unit's properties; raises InputError."""
+def _given(root: Any) -> dict[str, Any]:
+    """Design and model from a unit's properties; raises InputError."""
     # Imported late: it needs the solver's packages, which a Blender may lack.
     from ...optimization.design_file import parse_design, read_design
 
     unit, s = to_unit(root.mu_unit), root.mu_optimize
     body = envelope.envelope_in(root, unit)
     if s.source == "file":
-        if not s.file:
-            raise InputError("no file is chosen", "Optimize, File", "choose a design.toml")
         design = read_design(Path(bpy.path.abspath(s.file)), unit if s.own_unit else None, body)
     else:
         design = parse_design(toml_text(document(root)), DESIGN, unit, body=body)
-    return Optimize(design=design, model=_model(root))
+    return {"design": design, "model": _model(root)}
+
+
+def _hindered(root: Any) -> str:
+    """Why a search cannot begin with what the panel has."""
+    s = root.mu_optimize
+    if s.source == "file":
+        return "" if s.file else "Choose a design.toml first"
+    if s.targets and s.freedoms:
+        return ""
+    return f"Add a {'parameter that may change' if s.targets else 'target'} first"
 
 
 def _model(root: Any) -> Any:
@@ -211,7 +218,7 @@ class _Text:
 
 
 def unchecked_texts(root: Any) -> dict[str, str]:
-    """The texts of `job_of` from the panel's lists, by name of the file, not checked; raises InputError."""
+    """The texts of the inputs' files from the panel's lists, by name, not checked; raises InputError."""
     tables, unit = document(root), to_unit(root.mu_unit)
     body = envelope.envelope_in(root, unit)
     fixed = {table["parameter"]: table["fixed"] for table in tables["freedom"] if "fixed" in table}
@@ -223,12 +230,12 @@ def unchecked_texts(root: Any) -> dict[str, str]:
     return Optimize(design=design, model=_model(root)).texts()
 
 
-def write_inputs(root: Any, folder: Path) -> None:
-    """Write the inputs of the unit's optimisation into a folder; raises InputError, OutputError."""
+def _texts(root: Any) -> dict[str, str]:
+    """The texts of the inputs' files; raises InputError."""
     own = root.mu_optimize
     files = own.source == "file" or any(".toml" in freedom.values for freedom in own.freedoms)
     if files or prepared.at_once():
-        job = job_of(root)
+        job = OPTIMIZE.inputs(root)
         texts, orientation_deg = job.texts(), job.design.orientation_deg
     else:
         # The job checks them: the packages that this takes would hold the window for a second.
@@ -241,43 +248,43 @@ def write_inputs(root: Any, folder: Path) -> None:
                 "Optimize, Own Weight",
                 "turn it equally in both",
             )
-    write_run(folder, Optimize.layout(), texts)
+    return texts
 
 
-_found: FileCache[Findings] = FileCache()
 _units: FileCache[str] = FileCache()
 
 
 def findings(root: Any) -> Findings | None:
     """Results of the unit's optimisation, or None where none can be read."""
-    folder = folder_of(root)
-    files = [folder / name for name in (SUMMARY, UNIT)]
-    found = _found.read(files, lambda: _read(files[0]))
-    if found is None:
+    known = OPTIMIZE.found(root)
+    if known is None:
         return None
-    now = _now(root)
-    proposed = tuple(attrs.evolve(p, applied=_hash_of(p.file) == now) for p in found.proposed)
-    other = now != _hash_of(files[1]) and not any(p.applied for p in proposed)
-    return attrs.evolve(found, proposed=proposed, other_start=other)
+    found, folder, now = known.content, known.folder, _now(root)
+    files = [folder / p.file for p in found.proposed]
+    proposed = tuple(
+        attrs.evolve(p, file=file, applied=_hash_of(file) == now)
+        for p, file in zip(found.proposed, files, strict=True)
+    )
+    other = now != _hash_of(folder / UNIT) and not any(p.applied for p in proposed)
+    return attrs.evolve(found, folder=folder, proposed=proposed, other_start=other)
 
 
 def _hash_of(file: Path) -> str | None:
     return _units.read([file], lambda: shape_hash(as_kept(read_unit(file))))
 
 
-def _read(summary: Path) -> Findings:
-    found, folder = dict(parse_json(file_bytes(summary), summary.name)), summary.parent
-    proposed = []
+def _read(summary: Any) -> Findings:
+    """Results by summary.json; their folder is not known here."""
+    found, proposed = dict(summary), []
     for number, row in enumerate(map(dict, found.get("proposed") or ()), 1):
         targets = tuple(
             {key: t[key] for key in TARGET_KEYS} | {"standard_error": float(t["standard_error"] or 0.0)}
             for t in row.get("targets") or ()
         )
         texts = (tuple(map(str, row.get(key) or ())) for key in ("changes", "reasons"))
-        file = folder / Path(str(row["file"])).name
-        proposed.append(Proposed(number, file, targets, *texts))
+        proposed.append(Proposed(number, Path(Path(str(row["file"])).name), targets, *texts))
     return Findings(
-        folder,
+        Path(),
         str(found.get("status", "")),
         found.get("feasible") is True,
         str(found.get("outcome", "")),
@@ -286,6 +293,19 @@ def _read(summary: Path) -> Findings:
         tuple(map(str, found.get("in_the_way") or ())),
         tuple(proposed),
     )
+
+
+OPTIMIZE = StudyJob(
+    "optimize",
+    OPTIMIZATION,
+    folder_of,
+    _given,
+    hindered=_hindered,
+    made_of=_read,
+    stale=lambda root, folder: "",
+    quick=lambda root: False,
+    texts=_texts,
+)
 
 
 def _now(root: Any) -> str:
@@ -307,10 +327,15 @@ def as_kept(unit: Unit) -> Unit:
     return attrs.evolve(unit, scale=exact(unit.scale), **sections)
 
 
+def proposed(root: Any) -> tuple[Proposed, ...]:
+    """The proposed units; none without results."""
+    found = findings(root)
+    return () if found is None else found.proposed
+
+
 def proposed_unit(root: Any, number: int) -> Unit:
     """Proposed unit of a number from 1, from its file; raises InputError without one."""
-    found = findings(root)
-    rows = () if found is None else found.proposed
+    rows = proposed(root)
     if not 1 <= number <= len(rows):
         raise InputError(f"no unit {number} is proposed", "Optimize", "run the optimisation first")
     return read_unit(rows[number - 1].file)

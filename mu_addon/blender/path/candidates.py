@@ -10,7 +10,7 @@ from ..jobs.start_child import JOB_ENDED
 from ..preview import skeletons
 from ..preview.skeletons import Skeleton
 from ..shared import displays, viewports
-from ..shared.registration import add_handlers, remove_handlers
+from ..shared.registration import connected
 from ..unit import drawing, preview_update
 from ..unit import object as unit_object
 from ..unit.object import DRAWN_BESIDE, PREVIEW_DRAWN
@@ -29,6 +29,7 @@ def candidate(root: Any, name: str) -> Any | None:
     return drawing.beside(root, CANDIDATE + name)
 
 
+@connected(PREVIEW_DRAWN)
 def _draw(root: Any) -> None:
     """Draw every candidate path beside the lattice, in the colour of its J if it is known, or none."""
     unit, drawn = to_unit(root.mu_unit), dict[str, Skeleton]()
@@ -70,24 +71,13 @@ def _keep_in_view(uuid: str) -> None:
         viewports.keep_in_view(viewports.corners([root]), viewports.corners([root, *tubes]))
 
 
+@connected(DRAWN_BESIDE)
 def _known(root: Any) -> Any:
     """Results by which the paths are coloured; () while they are hidden."""
     return (ranking.known(root), ranking.free(root)) if root.mu_unit.candidates else ()
 
 
+@connected(JOB_ENDED)
 def _job_ended(_key: str) -> None:
     # Its results appear on the paths.
     preview_update.catch_up()
-
-
-_CONNECTIONS = ((PREVIEW_DRAWN, _draw), (DRAWN_BESIDE, _known), (JOB_ENDED, _job_ended))
-
-
-def register() -> None:
-    """Draw the paths with each preview, and again when a job ends."""
-    add_handlers({}, _CONNECTIONS)
-
-
-def unregister() -> None:
-    """Stop that."""
-    remove_handlers({}, _CONNECTIONS)

@@ -21,6 +21,7 @@ from ...design.anchors import anchor_points, window
 from ...errors import InputError
 from ..results import legend
 from ..shared import viewports
+from ..shared.registration import timer
 from ..shared.wording import path_symbol
 from ..unit import object as unit_object
 from ..unit.properties import to_unit
@@ -43,16 +44,16 @@ def point_out(name: str) -> None:
     """Draw a path in its true place for some seconds, as if the mouse were over its bar."""
     global _listed
     _listed = name
-    if bpy.app.timers.is_registered(_let_go):
-        bpy.app.timers.unregister(_let_go)
-    bpy.app.timers.register(_let_go, first_interval=SHOWN_S)
-    viewports.redraw_views(panels=False)
+    _let_go.cancel()
+    _let_go.soon(SHOWN_S)
+    viewports.redraw_regions("WINDOW")
 
 
+@timer()
 def _let_go() -> None:
     global _listed
     _listed = ""
-    viewports.redraw_views(panels=False)
+    viewports.redraw_regions("WINDOW")
 
 
 def nearest(mouse: Any, bars: dict[str, Any], reach: float) -> str:
@@ -86,7 +87,6 @@ def _on_screen(context: Any, points: Any) -> Any | None:
 class MU_GT_candidate(bpy.types.Gizmo):
     """All bars of the active unit: the one under the mouse shows its true place"""
 
-    bl_idname = "MU_GT_candidate"
     __slots__ = ("choice", "path")
 
     def setup(self):
@@ -149,7 +149,6 @@ def _draw_path(context: Any, root: Any, name: str, named: bool) -> None:
 class MU_GGT_candidates(bpy.types.GizmoGroup):
     """Candidate paths of the active unit"""
 
-    bl_idname = "MU_GGT_candidates"
     bl_label = "Candidate Paths"
     bl_space_type, bl_region_type = "VIEW_3D", "WINDOW"
     bl_options = {"PERSISTENT", "SCALE"}
@@ -161,13 +160,3 @@ class MU_GGT_candidates(bpy.types.GizmoGroup):
 
     def setup(self, context):
         self.gizmos.new(MU_GT_candidate.bl_idname)
-
-
-register, _remove_classes = bpy.utils.register_classes_factory((MU_GT_candidate, MU_GGT_candidates))
-
-
-def unregister() -> None:
-    """Unregister the gizmos, and the timer."""
-    if bpy.app.timers.is_registered(_let_go):
-        bpy.app.timers.unregister(_let_go)
-    _remove_classes()

@@ -13,7 +13,7 @@ from bpy_extras.view3d_utils import location_3d_to_region_2d
 from ..results import field_colours, legend
 from ..results import motion as motion_parts
 from ..shared.displays import PART
-from ..shared.viewports import Overlay
+from ..shared.registration import overlay
 from ..shared.wording import path_symbol
 from ..unit import object as unit_object
 from . import ranking
@@ -53,15 +53,17 @@ def label(root: Any, known: ranking.Known, name: str) -> list[str]:
     return found
 
 
+@overlay
 def _draw() -> None:
     context = bpy.context
-    root, tubes = _subject(context)
-    if not tubes:
+    # Of the active unit, or another if that shows none, so that the legend fits the colours.
+    root = unit_object.first_that(context, seen)
+    if root is None:
         return
     known = ranking.known(root)
     scale = context.preferences.system.ui_scale
     size = round(12 * scale)
-    for name, tube in tubes:
+    for name, tube in seen(root):
         end = location_3d_to_region_2d(
             context.region, context.region_data, tube.matrix_world @ tube.data.vertices[0].co
         )
@@ -73,19 +75,6 @@ def _draw() -> None:
             legend.write(text, end.x - width / 2.0, end.y - 1.3 * size * line - 0.3 * size, size)
     if known.numbers and root.mu_motion.legend:
         _legend(context, root, known)
-
-
-def _subject(context: Any) -> tuple[Any, list[tuple[str, Any]]]:
-    """Unit of the visible candidate paths, and these paths.
-
-    It is the active one, or another if that shows none, so that the legend fits the colours.
-    """
-    active = unit_object.active_root(context)
-    for root in [active, *(other for other in unit_object.roots() if other != active)]:
-        tubes = [] if root is None else seen(root)
-        if tubes:
-            return root, tubes
-    return active, []
 
 
 def _legend(context: Any, root: Any, known: ranking.Known) -> None:
@@ -109,7 +98,3 @@ def seen(root: Any) -> list[tuple[str, Any]]:
         for part, child in found
         if part.startswith(CANDIDATE) and child.visible_get() and len(child.data.vertices)
     ]
-
-
-_overlay = Overlay(_draw)
-register, unregister = _overlay.register, _overlay.unregister

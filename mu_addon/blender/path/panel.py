@@ -6,6 +6,8 @@ import bpy
 from bpy.props import EnumProperty
 
 from ...design.anchors import windows
+from ..shared.panels import plain_row
+from ..shared.registration import attach
 from ..shared.wording import anchors_of, path_symbol
 from ..unit.base_classes import DONE, UnitPanel, parameters
 from . import ranking
@@ -19,10 +21,19 @@ ORDERS = (
 )
 
 
+attach(
+    __name__,
+    bpy.types.WindowManager,
+    "mu_path_order",
+    lambda: EnumProperty(
+        name="Order", description="Order of the list of paths", items=ORDERS, default="deviation"
+    ),
+)  # no file keeps it
+
+
 class MU_PT_path(UnitPanel, bpy.types.Panel):
     """Candidate paths and the waveguide along the chosen one"""
 
-    bl_idname = "MU_PT_path"
     bl_label = "Sensor Paths"
     place = ("path",)
 
@@ -32,9 +43,8 @@ class MU_PT_path(UnitPanel, bpy.types.Panel):
 
     def show(self, layout, context, root):
         props = root.mu_unit
-        row = layout.row()
-        row.use_property_split = False
-        row.prop(props, "candidates", toggle=True, icon="HIDE_OFF" if props.candidates else "HIDE_ON")
+        icon = "HIDE_OFF" if props.candidates else "HIDE_ON"
+        plain_row(layout).prop(props, "candidates", toggle=True, icon=icon)
         _list(layout, context, root)
         name = selected_candidate(context)
         if name and name != props.path:
@@ -47,8 +57,7 @@ def _list(layout, context, root) -> None:
     """Draw every path: its anchors and, once ranked, its mean deviation and rank."""
     known = ranking.known(root)
     ranked = bool(known.numbers) and not known.stale
-    row = layout.row(align=True)
-    row.use_property_split = False
+    row = plain_row(layout)
     row.enabled = ranked
     row.prop(context.window_manager, "mu_path_order", expand=True)
     # Same height in both cases, so that a click on a run without a ranking moves nothing.
@@ -80,22 +89,3 @@ def in_order(root, known: ranking.Known, order: str):
     numbers |= {name: (1, bound) for name, bound in known.at_least.items()}
     # Sorting is stable.
     return sorted(found, key=lambda window: numbers.get(window.name, (2, 0.0)))
-
-
-CLASSES = (MU_PT_path,)
-
-_register_classes, _unregister_classes = bpy.utils.register_classes_factory(CLASSES)
-
-
-def register() -> None:
-    """Register the panel, and the order of its list, which no file keeps."""
-    bpy.types.WindowManager.mu_path_order = EnumProperty(
-        name="Order", description="Order of the list of paths", items=ORDERS, default="deviation"
-    )
-    _register_classes()
-
-
-def unregister() -> None:
-    """Unregister them."""
-    _unregister_classes()
-    del bpy.types.WindowManager.mu_path_order

@@ -9,13 +9,12 @@ timer makes the choice a moment later.
 from typing import Any
 
 import bpy
-from bpy.app.handlers import persistent
 from bpy.props import StringProperty
 
 from ...design.anchors import window
-from ..shared import updates
+from ..shared import restoring, updates, viewports
 from ..shared.displays import PART
-from ..shared.registration import add_handlers, remove_handlers
+from ..shared.registration import RESTORED, handler, timer
 from ..unit import object as unit_object
 from ..unit.base_classes import UnitOperator
 from ..unit.properties import to_unit
@@ -26,9 +25,7 @@ from .candidates import CANDIDATE
 class MU_OT_path(UnitOperator, bpy.types.Operator):
     """Lay the waveguide along this path"""
 
-    bl_idname = "mu.path"
     bl_label = "Choose Sensor Path"
-    bl_options = {"REGISTER", "UNDO"}
 
     name: StringProperty(
         name="Path",
@@ -64,40 +61,30 @@ _last = 0
 """Number of the object that was active at the last check: only another one is a click."""
 
 
-_restoring = False
-"""True during undo or redo: an object they make active was clicked before."""
-
-
 def _active() -> int:
     found = unit_object.active_object(bpy.context)
     return 0 if found is None else int(found.session_uid)
 
 
-@persistent
-def _begin_restoring(*_: Any) -> None:
-    global _restoring
-    _restoring = True
-
-
-@persistent
+@handler(*RESTORED)
 def _restored(*_: Any) -> None:
-    global _restoring, _last
-    _restoring, _last = False, _active()
+    global _last
+    _last = _active()
 
 
-@persistent
+@handler("depsgraph_update_post")
 def _updated(*_: Any) -> None:
     global _last
-    if _restoring or _active() == _last:
+    if restoring.now() or _active() == _last:
         return
     _last = _active()
-    if selected_candidate(bpy.context) and not bpy.app.timers.is_registered(_choose):
-        bpy.app.timers.register(_choose, first_interval=0.0)
+    if selected_candidate(bpy.context):
+        _choose.soon()
 
 
+@timer()
 def _choose() -> None:
-    windows = bpy.context.window_manager.windows
-    with bpy.context.temp_override(window=windows[0]) if windows else bpy.context.temp_override():
+    with viewports.in_window():
         choose_active()
 
 
@@ -109,27 +96,3 @@ def choose_active() -> None:
     name, root = selected_candidate(context), unit_object.root_of(context.object)
     if name and root is not None and root.mu_unit.path != name and bpy.ops.mu.path.poll():
         bpy.ops.mu.path("EXEC_DEFAULT", True, name=name)
-
-
-_HANDLERS = {
-    "depsgraph_update_post": _updated,
-    **dict.fromkeys(("undo_pre", "redo_pre"), _begin_restoring),
-    **dict.fromkeys(("undo_post", "redo_post", "load_post"), _restored),
-}
-
-
-_add_class, _remove_class = bpy.utils.register_classes_factory((MU_OT_path,))
-
-
-def register() -> None:
-    """Register the operator, and handlers that watch the active object."""
-    _add_class()
-    add_handlers(_HANDLERS)
-
-
-def unregister() -> None:
-    """Unregister them."""
-    remove_handlers(_HANDLERS)
-    if bpy.app.timers.is_registered(_choose):
-        bpy.app.timers.unregister(_choose)
-    _remove_class()

@@ -5,9 +5,9 @@ from __future__ import annotations
 from typing import Any
 
 import attrs
-import bpy
 import numpy as np
 
+from ..preview import materials
 from ..results import field_colours
 from ..shared.compat import set_modifier_input
 from ..shared.wording import path_symbol
@@ -113,7 +113,9 @@ def colour_free(root: Any, tube: Any, name: str, j: float) -> None:
 
 
 def _colour(root: Any, found: Known, name: str, tube: Any, j: float) -> None:
-    colour = _material(f"MU J {root.mu_unit.uuid[:8]} {name}", field_colours.of_map(found.share_of(j)))
+    colour = materials.coloured(
+        f"MU J {root.mu_unit.uuid[:8]} {name}", field_colours.of_map(found.share_of(j))
+    )
     tube.data.materials[0] = colour
     set_modifier_input(tube.modifiers[0], "Material", colour)
 
@@ -122,17 +124,4 @@ def write_colour(tube: Any) -> None:
     """Give a tube's points the colour of its material, which solid shading shows by attribute."""
     mesh = tube.data
     colour = np.float32(mesh.materials[0].diffuse_color)
-    attribute = mesh.color_attributes.get(field_colours.COLOUR) or mesh.color_attributes.new(
-        field_colours.COLOUR, "FLOAT_COLOR", "POINT"
-    )
-    attribute.data.foreach_set("color", np.broadcast_to(colour, (len(mesh.vertices), 4)).ravel())
-    mesh.color_attributes.active_color = mesh.color_attributes[field_colours.COLOUR]
-
-
-def _material(name: str, colour: tuple[float, ...]) -> Any:
-    found = bpy.data.materials.get(name) or bpy.data.materials.new(name)
-    found.diffuse_color = colour
-    shader = found.node_tree.nodes.get("Principled BSDF") if found.node_tree else None
-    if shader is not None:
-        shader.inputs["Base Color"].default_value = colour
-    return found
+    field_colours.set_colours(mesh, np.broadcast_to(colour, (len(mesh.vertices), 4)))

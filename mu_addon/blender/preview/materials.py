@@ -36,12 +36,18 @@ def material(name: str):
     """The material of that name, created with its colour if the file has none."""
     found = bpy.data.materials.get(name)
     if found is None:
-        found = bpy.data.materials.new(name)
-        found.diffuse_color = COLOURS[name]
+        found = coloured(name, COLOURS[name])
         found.roughness = 0.5
-        surface = found.node_tree.nodes.get("Principled BSDF") if found.node_tree else None
-        if surface is not None:
-            surface.inputs["Base Color"].default_value = COLOURS[name]
+    return found
+
+
+def coloured(name: str, colour):
+    """The material of that name, created if the file has none, in a colour (4,), linear."""
+    found = bpy.data.materials.get(name) or bpy.data.materials.new(name)
+    found.diffuse_color = colour
+    surface = found.node_tree.nodes.get("Principled BSDF") if found.node_tree else None
+    if surface is not None:
+        surface.inputs["Base Color"].default_value = colour
     return found
 
 

@@ -201,6 +201,12 @@ def box(low: ArrayLike, high: ArrayLike) -> Skeleton:
     return Skeleton(corners, faces=(_CUBE_FACES,), smooth=False)
 
 
+def ball(radius: float, around: int = 16) -> Skeleton:
+    """A ball around the origin."""
+    polar = np.linspace(0.0, np.pi, around // 2 + 1)
+    return _revolved(radius * np.column_stack([np.sin(polar), -np.cos(polar)]), closed=True, around=around)
+
+
 def joined(parts: Sequence[Skeleton]) -> Skeleton:
     """Several skeletons as one; an attribute that one of them lacks is 0 there."""
     counts = [len(part.vertices) for part in parts]
@@ -260,14 +266,14 @@ def _polylines(count: int, points: int) -> Integers:
     return np.stack([first, first + 1], axis=-1).reshape(-1, 2)
 
 
-def _revolved(curve: Floats, closed: bool) -> Skeleton:
+def _revolved(curve: Floats, closed: bool, around: int = AROUND) -> Skeleton:
     """Curve (n, 2) of (radius, z) around z: whole, or the half x <= 0; points on the axis are poles."""
     angle = (
-        np.linspace(0.0, 2.0 * np.pi, AROUND + 1)
+        np.linspace(0.0, 2.0 * np.pi, around + 1)
         if closed
-        else np.linspace(0.5, 1.5, AROUND // 2 + 1) * np.pi
+        else np.linspace(0.5, 1.5, around // 2 + 1) * np.pi
     )
-    columns = AROUND if closed else len(angle)
+    columns = around if closed else len(angle)
     angle = angle[:columns]
     ring = np.stack([np.cos(angle), np.sin(angle)], axis=1)
     on_axis = curve[:, 0] < 1e-9

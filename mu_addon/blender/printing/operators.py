@@ -6,8 +6,10 @@ import bpy
 from bpy.props import BoolProperty, FloatVectorProperty, IntProperty
 
 from ...design.settings import UP
+from ...errors import InputError
 from ..jobs.operators import FILES, RUN_FILES, job_operators
-from ..simulate.study_job import StudyOperator
+from ..shared import viewports
+from ..shared.operators import operator, unless
 from ..unit import object as unit_object
 from ..unit.base_classes import UnitOperator, ValidUnitOperator
 from ..unit.properties import to_unit
@@ -17,31 +19,30 @@ from . import state as printing
 NOT_CHECKED = "Check the print first"
 
 
-class MU_OT_print_check(StudyOperator, ValidUnitOperator, bpy.types.Operator):
+@operator(ValidUnitOperator, "Check Print", undo=False, trouble=printing.CHECK.trouble)
+def print_check(root):
     """Check the printability and rank the build directions, in a child process"""
-
-    bl_idname = "mu.print_check"
-    bl_label = "Check Print"
-    bl_options = {"REGISTER"}
-    job = printing.CHECK
+    printing.CHECK.start(root)
 
 
-class MU_OT_print_check_file(StudyOperator, ValidUnitOperator, bpy.types.Operator):
+@operator(ValidUnitOperator, "Check File", undo=False, trouble=printing.FILE_CHECK.trouble)
+def print_check_file(root):
     """Check the printability of an STL file, repaired first if asked"""
-
-    bl_idname = "mu.print_check_file"
-    bl_label = "Check File"
-    bl_options = {"REGISTER"}
-    job = printing.FILE_CHECK
+    printing.FILE_CHECK.start(root)
 
 
-class MU_OT_print_export(StudyOperator, ValidUnitOperator, bpy.types.Operator):
+class MU_OT_print_export(ValidUnitOperator, bpy.types.Operator):
     """Write the chosen files of the unit with its path; asks first if the check found errors"""
 
-    bl_idname = "mu.print_export"
     bl_label = "Export"
     bl_options = {"REGISTER"}
-    job = printing.EXPORT
+
+    @classmethod
+    def trouble(cls, root):
+        return super().trouble(root) or printing.EXPORT.trouble(root)
+
+    def act(self, context, root):
+        printing.EXPORT.start(root)
 
     def invoke(self, context, event):
         found = printing.CHECK.found(unit_object.active_root(context))
@@ -59,13 +60,10 @@ class MU_OT_print_export(StudyOperator, ValidUnitOperator, bpy.types.Operator):
         )
 
 
-class MU_OT_print_specimens(StudyOperator, ValidUnitOperator, bpy.types.Operator):
+@operator(ValidUnitOperator, "Export Specimens", undo=False, trouble=printing.SPECIMENS.trouble)
+def print_specimens(root):
     """Write lattice cubes, coupons and a gauge to print, a sheet of measurements, a folder for the data"""
-
-    bl_idname = "mu.print_specimens"
-    bl_label = "Export Specimens"
-    bl_options = {"REGISTER"}
-    job = printing.SPECIMENS
+    printing.SPECIMENS.start(root)
 
 
 def _path_of(root, what):
@@ -97,160 +95,102 @@ class _OfCheck(UnitOperator):
         return f"The check is stale: {found.stale}" if found.stale else ""
 
 
-class MU_OT_print_marks(_OfCheck, bpy.types.Operator):
+@operator(_OfCheck, "Mark Places")
+def print_marks(root):
     """Mark every place of every error (red) and warning (orange), and the build direction (arrow)"""
-
-    bl_idname = "mu.print_marks"
-    bl_label = "Mark Places"
-    bl_options = {"REGISTER", "UNDO"}
-
-    def act(self, context, root):
-        marks.mark(root, printing.CHECK.found(root))
+    marks.mark(root, printing.CHECK.found(root))
 
 
-class MU_OT_print_clear(UnitOperator, bpy.types.Operator):
+@operator(UnitOperator, "Clear Marks", trouble=unless(marks.mark_objects, "No place is marked"))
+def print_clear(root):
     """Remove the marks of the check from the scene"""
-
-    bl_idname = "mu.print_clear"
-    bl_label = "Clear Marks"
-    bl_options = {"REGISTER", "UNDO"}
-
-    @classmethod
-    def trouble(cls, root):
-        return "" if marks.mark_objects(root) else "No place is marked"
-
-    def act(self, context, root):
-        marks.clear(root)
+    marks.clear(root)
 
 
-class MU_OT_print_show(_OfCheck, bpy.types.Operator):
-    """Turn the view to a location of this finding; click again for the next one"""
-
-    bl_idname = "mu.print_show"
-    bl_label = "Show Finding"
-    bl_options = {"REGISTER", "UNDO"}
-
-    # Not kept from the last call: a click on a row concerns that row alone.
-    finding: IntProperty(
+@operator(
+    _OfCheck,
+    "Show Finding",
+    finding=IntProperty(
         name="Finding", description="Its number in the list, from 0", min=0, options={"SKIP_SAVE"}
-    )
-    place: IntProperty(
+    ),
+    place=IntProperty(
         name="Place",
         description="Number of the place, from 0; -1: the one after that shown",
         default=-1,
         min=-1,
         options={"SKIP_SAVE"},
-    )
-    view: BoolProperty(
+    ),
+    view=BoolProperty(
         name="Turn the View", description="Turn the 3D views to it", default=True, options={"SKIP_SAVE"}
-    )
-
-    def act(self, context, root):
-        found, settings = printing.CHECK.found(root), root.mu_print
-        if self.finding >= len(found.content["findings"]):
-            self.report({"ERROR"}, f"There are {len(found.content['findings'])} findings")
-            return {"CANCELLED"}
-        chosen = found.content["findings"][self.finding]
-        places = chosen["places"]
-        if self.place >= max(len(places), 1):
-            self.report({"ERROR"}, f"{chosen['check']}: it has {len(places)} places")
-            return {"CANCELLED"}
-        next_one = settings.place + 1 if settings.finding == self.finding else 0
-        if marks.marked(root) != found.digest:
-            marks.mark(root, found)
-        settings.finding = self.finding
-        settings.place = (next_one if self.place < 0 else self.place) % max(len(places), 1)
-        marks.resize(root)
-        if len(places):
-            for obj in context.selected_objects:
-                obj.select_set(False)
-            for obj in marks.mark_objects(root):
-                if obj[marks.MARK] == str(self.finding):
-                    obj.select_set(True)
-            if self.view:
-                reach = to_unit(root.mu_unit).dimensions.cell
-                marks.frame(root, places[settings.place], reach)
-        return {"FINISHED"}
+    ),
+)
+def print_show(context, root, finding, place, view):
+    """Turn the view to a location of this finding; click again for the next one"""
+    found, settings = printing.CHECK.found(root), root.mu_print
+    if finding >= len(found.content["findings"]):
+        raise InputError(f"There are {len(found.content['findings'])} findings")
+    chosen = found.content["findings"][finding]
+    places = chosen["places"]
+    if place >= max(len(places), 1):
+        raise InputError(f"{chosen['check']}: it has {len(places)} places")
+    next_one = settings.place + 1 if settings.finding == finding else 0
+    if marks.marked(root) != found.digest:
+        marks.mark(root, found)
+    settings.finding = finding
+    settings.place = (next_one if place < 0 else place) % max(len(places), 1)
+    marks.resize(root)
+    if len(places):
+        number = str(finding)
+        viewports.select(context, [obj for obj in marks.mark_objects(root) if obj[marks.MARK] == number])
+        if view:
+            reach = to_unit(root.mu_unit).dimensions.cell
+            marks.frame(root, places[settings.place], reach)
 
 
-class MU_OT_print_up(UnitOperator, bpy.types.Operator):
-    """Use this build direction; check again for its findings"""
-
-    bl_idname = "mu.print_up"
-    bl_label = "Use Direction"
-    bl_options = {"REGISTER", "UNDO"}
-
-    direction: FloatVectorProperty(
+@operator(
+    UnitOperator,
+    "Use Direction",
+    direction=FloatVectorProperty(
         name="Up",
         description="Away from the platform, in the unit's frame",
         subtype="XYZ",
         default=UP,
         options={"SKIP_SAVE"},
-    )
-
-    def act(self, context, root):
-        root.mu_print.up = self.direction
-
-
-class MU_OT_print_layer(ValidUnitOperator, bpy.types.Operator):
-    """Show a layer of the solid along the build direction Up: material in yellow, enclosed areas in blue"""
-
-    bl_idname = "mu.print_layer"
-    bl_label = "Show Layer"
-    bl_options = {"REGISTER", "UNDO"}
-
-    @classmethod
-    def trouble(cls, root):
-        built = unit_object.solid_is_current(root)
-        return super().trouble(root) or ("" if built else "Build the solid first")
-
-    def act(self, context, root):
-        layer.put(root)
-
-
-class MU_OT_print_layer_clear(UnitOperator, bpy.types.Operator):
-    """Remove the layer from the scene, and show the whole solid again"""
-
-    bl_idname = "mu.print_layer_clear"
-    bl_label = "Clear Layer"
-    bl_options = {"REGISTER", "UNDO"}
-
-    @classmethod
-    def trouble(cls, root):
-        return "No layer is shown" if layer.layer_object(root) is None else ""
-
-    def act(self, context, root):
-        layer.clear(root)
-
-
-CLASSES = (
-    MU_OT_print_check,
-    MU_OT_print_check_file,
-    MU_OT_print_export,
-    MU_OT_print_specimens,
-    *job_operators(
-        printing.PRINTING,
-        "print_",
-        "check or export",
-        kept="files that are complete are kept",
-        first="check or export first",
-        items=[
-            ("report", "Report", "Every finding with pictures, and the build directions, in the browser"),
-            ("file_report", "Report of the File", "Every finding in the STL file, in the browser"),
-            ("check-file", "Checked File", "Folder of the file's check, with part.stl"),
-            ("export", "Files", "Folder of the exported files"),
-            ("specimens", "Specimens", "Folder of the specimens, their sheet and the folder for the data"),
-            *RUN_FILES[1:3],
-        ],
-        path_of=_path_of,
     ),
-    MU_OT_print_marks,
-    MU_OT_print_clear,
-    MU_OT_print_show,
-    MU_OT_print_up,
-    MU_OT_print_layer,
-    MU_OT_print_layer_clear,
 )
+def print_up(root, direction):
+    """Use this build direction; check again for its findings"""
+    root.mu_print.up = direction
 
 
-register, unregister = bpy.utils.register_classes_factory(CLASSES)
+def _print_layer_trouble(root):
+    built = unit_object.solid_is_current(root)
+    return "" if built else "Build the solid first"
+
+
+@operator(ValidUnitOperator, "Show Layer", trouble=_print_layer_trouble)
+def print_layer(root):
+    """Show a layer of the solid along the build direction Up: material in yellow, enclosed areas in blue"""
+    layer.put(root)
+
+
+@operator(UnitOperator, "Clear Layer", trouble=unless(layer.layer_object, "No layer is shown"))
+def print_layer_clear(root):
+    """Remove the layer from the scene, and show the whole solid again"""
+    layer.clear(root)
+
+
+CLASSES = job_operators(
+    printing.PRINTING,
+    "check or export first",
+    kept="files that are complete are kept",
+    items=[
+        ("report", "Report", "Every finding with pictures, and the build directions, in the browser"),
+        ("file_report", "Report of the File", "Every finding in the STL file, in the browser"),
+        ("check-file", "Checked File", "Folder of the file's check, with part.stl"),
+        ("export", "Files", "Folder of the exported files"),
+        ("specimens", "Specimens", "Folder of the specimens, their sheet and the folder for the data"),
+        *RUN_FILES[1:3],
+    ],
+    path_of=_path_of,
+)

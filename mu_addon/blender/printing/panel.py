@@ -9,7 +9,8 @@ import bpy
 
 from ...design.printing.finding import counted
 from ...run.child import FAILED
-from ..shared.panels import alert, fold, large_button, wrapped
+from ..jobs.panel import job_state
+from ..shared.panels import alert, fold, large_button, plain_row, wrapped
 from ..shared.wording import in_panel, path_symbol
 from ..unit import object as unit_object
 from ..unit.base_classes import DONE, OUTDATED, UnitPanel, folded_place
@@ -17,7 +18,6 @@ from . import layer, marks
 from . import state as printing
 from .properties import OWN_PRINTER
 
-JOB = "print_"
 ICONS = {"error": "CANCEL", "warning": "ERROR", "info": "INFO", "pass": "CHECKMARK"}
 DIRECTIONS = 3
 """Number of build directions that are shown; the report has them all."""
@@ -30,7 +30,6 @@ NOT_PRINTABLE = 6
 class MU_PT_print(UnitPanel, bpy.types.Panel):
     """The printable solid, its check and its files"""
 
-    bl_idname = "MU_PT_print"
     bl_label = "Print"
     place = ("print",)
 
@@ -58,7 +57,7 @@ def _state(layout, root, job) -> None:
         words = in_panel(str(child.error["what"])) if of_file else "Checked: not printable, as found below"
         alert(layout, words).operator("mu.print_dismiss")
     else:
-        job.draw_state(layout, root, JOB)
+        job_state(layout, job.child(root), "see below", printing.PRINTING.prefix)
 
 
 def _gates(layout, root, solid) -> None:
@@ -84,7 +83,6 @@ class _OfPrint(UnitPanel):
 class MU_PT_print_check(_OfPrint, bpy.types.Panel):
     """Printability check: findings with their locations, and the best build directions"""
 
-    bl_idname = "MU_PT_print_check"
     bl_label = "Check"
     bl_options = set()
 
@@ -137,8 +135,7 @@ def _findings(layout, settings, found) -> None:
         ).finding = number
         if chosen:
             _in_full(layout.box(), number, settings.place, finding)
-    header, body = layout.panel("MU_passed", default_closed=True)
-    header.label(text=f"{len(passed)} checks passed", icon="CHECKMARK")
+    body = fold(layout, "MU_passed", f"{len(passed)} checks passed", icon="CHECKMARK")
     if body:
         for finding in passed:
             wrapped(body, finding["what"])
@@ -175,7 +172,7 @@ def _directions(layout, settings, found) -> None:
     builds = found.content["orientation"]
     if not builds:
         return
-    body = fold(layout, "MU_directions", "Build Directions", False)
+    body = fold(layout, "MU_directions", "Build Directions")
     if not body:
         return
     chosen = [build for build in builds if _is_up(build, settings)]
@@ -221,10 +218,77 @@ def _is_up(build, settings) -> bool:
     return sum(a * b for a, b in zip(build["direction"], settings.up, strict=True)) > 0.9999
 
 
+class MU_PT_print_layers(_OfPrint, bpy.types.Panel):
+    """Layers of the solid, one at a time in the 3D view"""
+
+    bl_label = "Layers"
+    bl_options = {"DEFAULT_CLOSED"}
+
+    def show(self, layout, context, root):
+        settings = root.mu_print
+        shown = layer.layer_object(root)
+        if shown is None:
+            layout.operator("mu.print_layer", icon="ALIGN_MIDDLE")
+            wrapped(layout, "Layers are those of the solid, built along Up", "INFO")
+            return
+        row = layout.row(align=True)
+        row.prop(settings, "layer", slider=True)
+        row.operator("mu.print_layer_clear", text="", icon="X")
+        if not unit_object.solid_is_current(root):
+            alert(layout, "Of an earlier solid: build it again")
+            return
+        found = layer.facts(shown)
+        column = layout.column(align=True)
+        column.label(text=f"{found['height_mm']:.1f} of {found['whole_mm']:.1f} mm")
+        column.label(text=f"Material (yellow): {found['area_mm2']:.0f} mm²")
+        column.label(text=f"Enclosed (blue): {found['enclosed_mm2']:.0f} mm²")
+
+
+class MU_PT_print_files(_OfPrint, bpy.types.Panel):
+    """Files for printer and CAD, each read back and compared, and specimens to measure"""
+
+    bl_label = "Files"
+    bl_options = set()
+    place = ("print",)
+
+    def show(self, layout, context, root):
+        settings, found = root.mu_print, printing.CHECK.found(root)
+        plain_row(layout).prop(settings, "formats")
+        layout.prop(settings, "quality")
+        layout.prop(settings, "compensate")
+        if settings.compensate == "gauge":
+            layout.prop(settings, "gauge")
+        if settings.compensate != "none" and settings.formats & {"3mf-beams", "step"}:
+            wrapped(layout, "Beams and STEP keep their nominal size", "INFO")
+        layout.prop(settings, "vents")
+        if settings.vents:
+            wrapped(layout, f"Build direction: {direction_words(settings.up)}", "INFO")
+            if settings.formats & {"3mf-beams", "step"}:
+                wrapped(layout, "Beams and STEP have no vents", "INFO")
+        path = root.mu_unit.path
+        wrapped(
+            layout,
+            f"Waveguide along {path_symbol(path)}" if path else "Without a waveguide: no path chosen",
+            "INFO",
+        )
+        _check_state(layout, found)
+        words = printing.EXPORT.label(root, "Export")
+        large_button(layout, "mu.print_export", "EXPORT", root=root, text=words)
+        _state(layout, root, printing.EXPORT)
+        _written(layout, printing.EXPORT.found(root))
+        layout.operator("mu.export_stl", text="Export STL As ...", icon="FILE_FOLDER")
+        body = fold(layout, "MU_specimens", "Specimens")
+        if body:
+            row = body.row(align=True)
+            row.operator("mu.print_specimens", icon="OUTLINER_OB_LATTICE")
+            row.operator("mu.print_open", text="", icon="FILE_FOLDER").what = "specimens"
+            _state(body, root, printing.SPECIMENS)
+        folded_place(layout, root, "print", "Print Offsets")
+
+
 class MU_PT_print_file(_OfPrint, bpy.types.Panel):
     """Printability check of an STL file, with a repair before it"""
 
-    bl_idname = "MU_PT_print_file"
     bl_label = "STL File"
     bl_options = {"DEFAULT_CLOSED"}
 
@@ -253,78 +317,6 @@ class MU_PT_print_file(_OfPrint, bpy.types.Panel):
         row = layout.row(align=True)
         row.operator("mu.print_open", text="Report", icon="URL").what = "file_report"
         row.operator("mu.print_open", text="", icon="FILE_FOLDER").what = "check-file"
-
-
-class MU_PT_print_layers(_OfPrint, bpy.types.Panel):
-    """Layers of the solid, one at a time in the 3D view"""
-
-    bl_idname = "MU_PT_print_layers"
-    bl_label = "Layers"
-    bl_options = {"DEFAULT_CLOSED"}
-
-    def show(self, layout, context, root):
-        settings = root.mu_print
-        shown = layer.layer_object(root)
-        if shown is None:
-            layout.operator("mu.print_layer", icon="ALIGN_MIDDLE")
-            wrapped(layout, "Layers are those of the solid, built along Up", "INFO")
-            return
-        row = layout.row(align=True)
-        row.prop(settings, "layer", slider=True)
-        row.operator("mu.print_layer_clear", text="", icon="X")
-        if not unit_object.solid_is_current(root):
-            alert(layout, "Of an earlier solid: build it again")
-            return
-        found = layer.facts(shown)
-        column = layout.column(align=True)
-        column.label(text=f"{found['height_mm']:.1f} of {found['whole_mm']:.1f} mm")
-        column.label(text=f"Material (yellow): {found['area_mm2']:.0f} mm²")
-        column.label(text=f"Enclosed (blue): {found['enclosed_mm2']:.0f} mm²")
-
-
-class MU_PT_print_files(_OfPrint, bpy.types.Panel):
-    """Files for printer and CAD, each read back and compared, and specimens to measure"""
-
-    bl_idname = "MU_PT_print_files"
-    bl_label = "Files"
-    bl_options = set()
-    place = ("print",)
-
-    def show(self, layout, context, root):
-        settings, found = root.mu_print, printing.CHECK.found(root)
-        row = layout.row(align=True)
-        row.use_property_split = False
-        row.prop(settings, "formats")
-        layout.prop(settings, "quality")
-        layout.prop(settings, "compensate")
-        if settings.compensate == "gauge":
-            layout.prop(settings, "gauge")
-        if settings.compensate != "none" and settings.formats & {"3mf-beams", "step"}:
-            wrapped(layout, "Beams and STEP keep their nominal size", "INFO")
-        layout.prop(settings, "vents")
-        if settings.vents:
-            wrapped(layout, f"Build direction: {direction_words(settings.up)}", "INFO")
-            if settings.formats & {"3mf-beams", "step"}:
-                wrapped(layout, "Beams and STEP have no vents", "INFO")
-        path = root.mu_unit.path
-        wrapped(
-            layout,
-            f"Waveguide along {path_symbol(path)}" if path else "Without a waveguide: no path chosen",
-            "INFO",
-        )
-        _check_state(layout, found)
-        words = printing.EXPORT.label(root, "Export")
-        large_button(layout, "mu.print_export", "EXPORT", root=root, text=words)
-        _state(layout, root, printing.EXPORT)
-        _written(layout, printing.EXPORT.found(root))
-        layout.operator("mu.export_stl", text="Export STL As ...", icon="FILE_FOLDER")
-        body = fold(layout, "MU_specimens", "Specimens", False)
-        if body:
-            row = body.row(align=True)
-            row.operator("mu.print_specimens", icon="OUTLINER_OB_LATTICE")
-            row.operator("mu.print_open", text="", icon="FILE_FOLDER").what = "specimens"
-            _state(body, root, printing.SPECIMENS)
-        folded_place(layout, root, "print", "Print Offsets")
 
 
 def _check_state(layout, found) -> None:
@@ -372,9 +364,3 @@ def _written(layout, found) -> None:
         wrapped(column, words if count else f"No vent is needed: {_ml(before)} trapped at most", "INFO")
     for entry in found.content["refused"]:
         wrapped(column, f"Not written: {entry['format']}: {entry['why']}", "ERROR")
-
-
-CLASSES = (MU_PT_print, MU_PT_print_check, MU_PT_print_layers, MU_PT_print_files, MU_PT_print_file)
-
-
-register, unregister = bpy.utils.register_classes_factory(CLASSES)

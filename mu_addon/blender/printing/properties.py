@@ -9,14 +9,12 @@ from bpy.props import (
     FloatProperty,
     FloatVectorProperty,
     IntProperty,
-    StringProperty,
 )
 
 from ...design.assets import asset_names
 from ...design.settings import FINE, PRINTER, UP
-from ..shared.blender_property import blender_property
-from ..shared.registration import property_group_factory
-from ..unit.properties import BESIDE_BLEND_FILE
+from ..shared.blender_property import blender_property, path_property
+from ..shared.registration import property_of
 from . import layer, marks
 
 OWN_PRINTER = "own"
@@ -30,6 +28,7 @@ FORMATS = (
 """Formats of an export: the core's name, the name here, and their content."""
 
 
+@property_of(bpy.types.Object, "mu_print")
 class MU_PG_print(bpy.types.PropertyGroup):
     """Print settings of a unit, and the files to write."""
 
@@ -49,17 +48,9 @@ class MU_PG_print(bpy.types.PropertyGroup):
         ],
         default=PRINTER.default,
     )
-    printer_file: StringProperty(
-        name="Limits",
-        description="TOML file of a printer and its resin",
-        subtype="FILE_PATH",
-        options=BESIDE_BLEND_FILE,
-    )
-    limits_file: StringProperty(
-        name="Measured",
-        description="limits.csv of the specimens, filled in: limits that were measured on printed parts",
-        subtype="FILE_PATH",
-        options=BESIDE_BLEND_FILE,
+    printer_file: path_property("Limits", "TOML file of a printer and its resin")
+    limits_file: path_property(
+        "Measured", "limits.csv of the specimens, filled in: limits that were measured on printed parts"
     )
     up: FloatVectorProperty(
         name="Up",
@@ -92,22 +83,14 @@ class MU_PG_print(bpy.types.PropertyGroup):
             ("gauge", "Gauge", "Measured with calipers on the printed gauge of the specimens"),
         ],
     )
-    gauge: StringProperty(
-        name="Sheet",
-        description="gauge.csv of the specimens with the sizes that were measured",
-        subtype="FILE_PATH",
-        options=BESIDE_BLEND_FILE,
-    )
+    gauge: path_property("Sheet", "gauge.csv of the specimens with the sizes that were measured")
     vents: BoolProperty(
         name="Vents",
         description="Vent the cups that trap resin if the unit is built along Up: STL and 3MF get a hole "
         "through the wall for each cup of the print check; plug-1.stl .. close the holes",
     )
-    stl_file: StringProperty(
-        name="File",
-        description="STL file to check, with the printer, the measured limits and Up as above",
-        subtype="FILE_PATH",
-        options=BESIDE_BLEND_FILE,
+    stl_file: path_property(
+        "File", "STL file to check, with the printer, the measured limits and Up as above"
     )
     repair: BoolProperty(
         name="Repair",
@@ -139,6 +122,3 @@ class MU_PG_print(bpy.types.PropertyGroup):
     # The finding in view, and its location in view; -1: none.
     finding: IntProperty(default=-1, options={"HIDDEN"})
     place: IntProperty(options={"HIDDEN"})
-
-
-register, unregister = property_group_factory(bpy.types.Object, "mu_print", (MU_PG_print,))

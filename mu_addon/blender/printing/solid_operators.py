@@ -12,6 +12,7 @@ from ...design.settings import FINE, QUALITY
 from ...design.solid import QUALITY as FACETS
 from ...design.stl_and_nodes import write_nodes, write_stl
 from ..shared.blender_property import blender_property
+from ..shared.operators import operator
 from ..unit import object as unit_object
 from ..unit.base_classes import ValidUnitOperator
 from ..unit.properties import to_unit
@@ -25,28 +26,20 @@ _ITEMS = [
 ]
 
 
-class MU_OT_solid(ValidUnitOperator, bpy.types.Operator):
+@operator(ValidUnitOperator, "Build Solid", quality=blender_property(QUALITY, items=_ITEMS))
+def solid(operator, root, quality):
     """Build the printable solid, with the waveguide of the chosen path, and check it; takes seconds"""
-
-    bl_idname = "mu.solid"
-    bl_label = "Build Solid"
-    bl_options = {"REGISTER", "UNDO"}
-
-    quality: blender_property(QUALITY, items=_ITEMS)
-
-    def act(self, context, root):
-        core = to_unit(root.mu_unit)
-        solid = solid_of(root, core, self.quality)
-        unit_object.put_solid(root, solid, core)
-        layer.follow(root)
-        gates = solid.gates
-        self.report({"INFO"}, f"Watertight, {gates.triangles} triangles, {gates.volume_mm3 / 1000:.2f} cm3")
+    core = to_unit(root.mu_unit)
+    solid = solid_of(root, core, quality)
+    unit_object.put_solid(root, solid, core)
+    layer.follow(root)
+    gates = solid.gates
+    operator.report({"INFO"}, f"Watertight, {gates.triangles} triangles, {gates.volume_mm3 / 1000:.2f} cm3")
 
 
 class MU_OT_export_stl(ValidUnitOperator, bpy.types.Operator, ExportHelper):
     """Build the solid in the quality to print, check it and write it as binary STL in mm"""
 
-    bl_idname = "mu.export_stl"
     bl_label = "Export STL"
     bl_options = {"REGISTER"}
 
@@ -75,9 +68,3 @@ class MU_OT_export_stl(ValidUnitOperator, bpy.types.Operator, ExportHelper):
             write_nodes(core, target.with_suffix(".txt"))
         write_stl(solid_of(root, core, self.quality, str(target)), target)
         self.report({"INFO"}, f"Written: {target}")
-
-
-CLASSES = (MU_OT_solid, MU_OT_export_stl)
-
-
-register, unregister = bpy.utils.register_classes_factory(CLASSES)

@@ -53,7 +53,9 @@ def latest_folder(root: Any) -> Path:
     return folder_of(root, CHECK.study) if child is None else child.folder.parent
 
 
-PRINTING = JobKind("print", lambda root: root.mu_unit.uuid, latest_folder, "job for the printer")
+PRINTING = JobKind(
+    "print", lambda root: root.mu_unit.uuid, latest_folder, "job for the printer", prefix="print_"
+)
 timings.READERS[PRINTING.name] = study_job.timed_study
 
 _printers: FileCache[Printer] = FileCache()

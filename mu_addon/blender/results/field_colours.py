@@ -216,13 +216,18 @@ def write_colours(root: Any, mesh: Any, values: Any | None, ends: tuple[float, f
 
     ends: range of the field, else the motion's.
     """
-    attribute = mesh.color_attributes.get(COLOUR) or mesh.color_attributes.new(COLOUR, "FLOAT_COLOR", "POINT")
     plain = np.float32(materials.COLOURS[_PLAIN])
     if values is None:
         found = np.broadcast_to(plain, (len(mesh.vertices), 4))
     else:
         found = colours(root, np.nan_to_num(values), ends)
         found[np.isnan(values)] = plain
-    attribute.data.foreach_set("color", np.ascontiguousarray(found).ravel())
+    set_colours(mesh, found)
+
+
+def set_colours(mesh: Any, colours: Any) -> None:
+    """Give a mesh's points colours (v, 4), linear, which solid shading shows."""
+    attribute = mesh.color_attributes.get(COLOUR) or mesh.color_attributes.new(COLOUR, "FLOAT_COLOR", "POINT")
+    attribute.data.foreach_set("color", np.ascontiguousarray(colours).ravel())
     if mesh.color_attributes.active_color_name != COLOUR:
         mesh.color_attributes.active_color_name = COLOUR

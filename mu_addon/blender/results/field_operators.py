@@ -23,9 +23,7 @@ OPEN = Quaternion((0.5, 0.5, 0.5, 0.5))
 class MU_OT_field_show(MotionOperator, bpy.types.Operator):
     """Paint this field on the unit, in view, at the frame at which it is largest"""
 
-    bl_idname = "mu.field_show"
     bl_label = "Show on the Unit"
-    bl_options = {"REGISTER", "UNDO"}
 
     field: EnumProperty(
         name="Field",
@@ -62,14 +60,12 @@ class MU_OT_field_show(MotionOperator, bpy.types.Operator):
         motion_parts.show(root, name, motion_parts.MESH)
         if self.field == motion_parts.DIFFERENCE and run_motions.difference_words(root):
             found = motion_parts.parts(root)
-            level = "INFO" if any(self.field in part.data.attributes for part in found) else "ERROR"
-            self.report({level}, run_motions.difference_words(root))
-            if level == "ERROR":
-                return {"CANCELLED"}
+            if not any(self.field in part.data.attributes for part in found):
+                raise InputError(run_motions.difference_words(root))
+            self.report({"INFO"}, run_motions.difference_words(root))
         motion_parts.to_largest(root, motion, context.scene, self.jump)
         if self.frame:
             frame_in_view(context, root)
-        return {"FINISHED"}
 
 
 def lacking(root, field: str) -> str:
@@ -133,9 +129,3 @@ def frame_in_view(context, root) -> None:
         if root.mu_motion.cut and toward.x < 0.5:
             view.view_rotation = inward
         viewports.frame_points(area, points)
-
-
-CLASSES = (MU_OT_field_show,)
-
-
-register, unregister = bpy.utils.register_classes_factory(CLASSES)

@@ -18,9 +18,9 @@ from bpy_extras.view3d_utils import location_3d_to_region_2d
 from gpu_extras.batch import batch_for_shader
 from mathutils import Vector
 
-from ..shared import viewports
+from ..shared import displays, viewports
 from ..shared.displays import LEGEND
-from ..shared.viewports import Overlay
+from ..shared.registration import overlay
 from ..simulate import study_folder as studies
 from ..unit import object as unit_object
 from . import field_colours, places
@@ -86,7 +86,6 @@ def lines(root: Any, motion: Any, scene: Any) -> list[str]:
     """
     field = field_colours.BY_NAME[root.mu_motion.field]
     time = motion_parts.time_of(motion, scene)
-    pressure = float(np.interp(time, motion.time_s, motion.pressure_kPa))
     found = [field.title]
     if root != unit_object.active_root(bpy.context):
         found.insert(0, root.name)
@@ -94,7 +93,7 @@ def lines(root: Any, motion: Any, scene: Any) -> list[str]:
     if field.name == motion_parts.DIFFERENCE and other is not None:
         itself = other.folder == motion.folder.parent
         found.append("the run compared with itself" if itself else f"to the run {other.title}")
-    found.append(f"{np.clip(time, motion.time_s[0], motion.time_s[-1]):.2f} s, {pressure + 0.0:.1f} kPa")
+    found.append(motion_parts.moment(motion, scene))
     for contact in studies.contact_forces(root):
         force = float(np.interp(time, contact.time_s, contact.force_N))
         found.append(f"{contact.name}: {force:.2f} N")
@@ -106,6 +105,7 @@ def lines(root: Any, motion: Any, scene: Any) -> list[str]:
     return found
 
 
+@overlay
 def _draw() -> None:
     context = bpy.context
     root = subject(context)
@@ -115,7 +115,7 @@ def _draw() -> None:
     shown = places.seen(root)
     scale = context.preferences.system.ui_scale
     size = round(12 * scale)
-    in_scene = any(child.get(LEGEND) and child.visible_get() for child in root.children)
+    in_scene = any(part.visible_get() for part in displays.parts(root, LEGEND))
     if not in_scene:
         texts = lines(root, motion, context.scene)
         place = room(context, len(texts))
@@ -134,9 +134,7 @@ def above(texts: Sequence[str], place: Room) -> None:
 
 def subject(context: Any) -> Any | None:
     """Unit of the legend: the active one, or another if that shows none."""
-    active = unit_object.active_root(context)
-    every = [active, *(root for root in unit_object.roots() if root != active)]
-    return next((root for root in every if root is not None and places.seen(root)), None)
+    return unit_object.first_that(context, places.seen)
 
 
 def beside_tools(area: Any) -> float:
@@ -255,7 +253,3 @@ def write(text: str, x: float, y: float, size: int, colour: tuple[float, ...] = 
     blf.position(0, x, y, 0)
     blf.draw(0, text)
     blf.disable(0, blf.SHADOW)
-
-
-_overlay = Overlay(_draw)
-register, unregister = _overlay.register, _overlay.unregister

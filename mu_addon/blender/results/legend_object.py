@@ -10,14 +10,13 @@ from typing import Any
 
 import bpy
 import numpy as np
-from bpy.app.handlers import persistent
 from mathutils import Matrix
 
 from ...errors import InputError
 from ..preview import materials, skeletons
 from ..shared import displays
 from ..shared.displays import LEGEND
-from ..shared.registration import add_handlers, remove_handlers
+from ..shared.registration import connected, handler
 from ..unit import object as unit_object
 from . import field_colours, legend
 from . import motion as motion_parts
@@ -32,7 +31,7 @@ _FACING_X = Matrix(((0.0, 0.0, 1.0), (1.0, 0.0, 0.0), (0.0, 1.0, 0.0))).to_4x4()
 
 def bar_of(root: Any) -> Any | None:
     """The unit's legend, or None."""
-    return next((child for child in root.children if child.get(LEGEND) == BAR), None)
+    return displays.part(root, LEGEND, BAR)
 
 
 def show(root: Any) -> Any:
@@ -61,6 +60,7 @@ def hide(root: Any) -> None:
             displays.remove(obj)
 
 
+@connected(motion_parts.COLOURED)
 def update(root: Any) -> None:
     """Write field, range and colours into the legend, if there is one."""
     bar = bar_of(root)
@@ -112,22 +112,7 @@ def _put_text(bar: Any, what: str, text: str, place: tuple[float, float]) -> Non
         obj.data.body = text
 
 
-@persistent
+@handler("frame_change_pre")
 def _before_frame(scene, *_):
     for root in unit_object.roots():
         update_text(root, scene)
-
-
-_HANDLERS = {"frame_change_pre": _before_frame}
-
-
-def register() -> None:
-    """Register the handler that writes time and pressure, and the update when colours change."""
-    add_handlers(_HANDLERS)
-    motion_parts.COLOURED.connect(update)
-
-
-def unregister() -> None:
-    """Unregister them."""
-    motion_parts.COLOURED.disconnect(update)
-    remove_handlers(_HANDLERS)

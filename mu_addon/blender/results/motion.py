@@ -14,7 +14,6 @@ from typing import Any
 import attrs
 import bpy
 import numpy as np
-from bpy.app.handlers import persistent
 
 from ...errors import InputError, MuError
 from ...report.motion_files import (
@@ -30,9 +29,9 @@ from ..jobs.prepared import NotPrepared
 from ..jobs.start_child import JOB_ENDED
 from ..preview import skeletons
 from ..printing.state import solid_of
-from ..shared import displays, updates, viewports
+from ..shared import displays, timeline, updates, viewports
 from ..shared.displays import MOTION
-from ..shared.registration import add_handlers, remove_handlers
+from ..shared.registration import at_end, connected, handler
 from ..shared.updates import Signal
 from ..shared.wording import path_symbol
 from ..simulate import study_folder as studies
@@ -66,7 +65,7 @@ _played: dict[tuple[Path, str, bool], Played] = {}
 
 def parts(root: Any) -> list[Any]:
     """Objects that show a unit's motion."""
-    return [child for child in root.children if child.get(MOTION)]
+    return displays.parts(root, MOTION)
 
 
 def owner(name: str) -> str:
@@ -129,6 +128,7 @@ def rebuild(root: Any) -> None:
         show(root, name, what)
 
 
+@connected(unit_object.REBUILT)
 def follow(root: Any) -> None:
     """Update the shown motions to the shown run, after a change of parameters, run or choice.
 
@@ -199,7 +199,7 @@ def _show_region(root: Any, motion: Motion, name: str, region: str) -> None:
     cut = root.mu_motion.cut and motion.halved
     skin = motion.skin(region, cut)
     file = motion.folder / PLAYED / f"{name}-{region}{'-cut' if cut else ''}.pc2"
-    old = next((part for part in parts(root) if part[MOTION] == f"{name}|{region}"), None)
+    old = displays.part(root, MOTION, f"{name}|{region}")
     if old is not None and _plays(old, file):
         return
     rest = skin.of_nodes(motion.mesh.nodes)
@@ -254,7 +254,7 @@ def vertices_of(mesh: Any) -> Any:
 
 
 def _part(root: Any, motion: Motion, name: str, body: str) -> Any:
-    part = next((part for part in parts(root) if part[MOTION] == f"{name}|{body}"), None)
+    part = displays.part(root, MOTION, f"{name}|{body}")
     if part is None:
         title = f"{'Model A' if name == MODEL_A else name} {body}"
         part = displays.add(root, MOTION, f"{name}|{body}", bpy.data.meshes.new(title))
@@ -303,8 +303,7 @@ def _keep_time(part: Any, step_s: float, scene: Any) -> None:
     twice.
     """
     modifier = part.modifiers.get("Motion")
-    rate = scene.render.fps / scene.render.fps_base
-    samples = 1.0 / (rate * step_s)
+    samples = timeline.step_s(scene) / step_s
     wanted = np.float32(samples), np.float32(samples * scene.frame_start)
     if modifier is not None and (modifier.frame_scale, modifier.frame_start) != wanted:
         modifier.frame_scale, modifier.frame_start = wanted
@@ -312,14 +311,19 @@ def _keep_time(part: Any, step_s: float, scene: Any) -> None:
 
 def time_of(motion: Motion, scene: Any) -> float:
     """Time of the protocol in s at the scene's frame."""
-    rate = scene.render.fps / scene.render.fps_base
-    return float(motion.time_s[0] + (scene.frame_current_final - scene.frame_start) / rate)
+    return float(motion.time_s[0] + timeline.seconds_at(scene))
+
+
+def moment(motion: Motion, scene: Any) -> str:
+    """Time of the protocol and its pressure at the scene's frame, as text."""
+    time = float(np.clip(time_of(motion, scene), motion.time_s[0], motion.time_s[-1]))
+    pressure = float(np.interp(time, motion.time_s, motion.pressure_kPa))
+    return f"{time:.2f} s, {pressure + 0.0:.1f} kPa"
 
 
 def frame_of(motion: Motion, time_s: float, scene: Any) -> int:
     """The scene's first frame at or after a time of the protocol."""
-    rate = scene.render.fps / scene.render.fps_base
-    return int(np.ceil(scene.frame_start + (time_s - float(motion.time_s[0])) * rate - 1e-6))
+    return int(np.ceil(timeline.frames_at(scene, time_s - float(motion.time_s[0])) - 1e-6))
 
 
 def last_frame(motion: Motion, scene: Any) -> int:
@@ -477,7 +481,7 @@ def _write(root: Any, scene: Any) -> None:
         part.data.update()
 
 
-@persistent
+@handler("frame_change_pre")
 def _before_frame(scene, *_):
     # Before Blender evaluates the frame, so that positions and fields belong to the same one.
     for root in unit_object.roots():
@@ -485,12 +489,13 @@ def _before_frame(scene, *_):
             _write(root, scene)
 
 
+@at_end
 def _forget() -> None:
     for kept in (_played, _prints, run_motions):
         kept.clear()
 
 
-@persistent
+@handler("load_post")
 def _loaded(*_):
     _forget()
     for root in unit_object.roots():
@@ -504,12 +509,14 @@ def _forget_trouble(root: Any) -> None:
         root.mu_motion.trouble = ""
 
 
+@connected(JOB_ENDED)
 def _job_ended(_key: str) -> None:
     for root in unit_object.roots():
         _forget_trouble(root)
         follow(root)
 
 
+@connected(VIEW_CHANGED)
 def _chosen(root: Any) -> None:
     """Show a result: if none is in the unit's place yet, that of Model A."""
     if updates.are_paused():
@@ -546,18 +553,3 @@ def to_largest(root: Any, motion: Motion, scene: Any, jump: bool = True) -> None
     peak = peak_frame(root, scene) if jump else None
     if peak is not None:
         scene.frame_set(peak)
-
-
-_HANDLERS = {"frame_change_pre": _before_frame, "load_post": _loaded}
-_CONNECTIONS = ((unit_object.REBUILT, follow), (JOB_ENDED, _job_ended), (VIEW_CHANGED, _chosen))
-
-
-def register() -> None:
-    """Register handlers that keep the fields at the scene's frame, and the motions with the shown run."""
-    add_handlers(_HANDLERS, _CONNECTIONS)
-
-
-def unregister() -> None:
-    """Unregister them."""
-    remove_handlers(_HANDLERS, _CONNECTIONS)
-    _forget()

@@ -8,6 +8,8 @@ from bpy.props import BoolProperty, EnumProperty, StringProperty
 from ...errors import InputError
 from ...report.motion_files import FOLDER, MODEL_A
 from ..shared import viewports
+from ..shared.operators import operator, unless
+from ..shared.registration import menu
 from ..simulate import study_folder as studies
 from ..unit import object as unit_object
 from ..unit.base_classes import UnitOperator
@@ -20,107 +22,82 @@ NO_MOTION = "No motion yet: simulate this unit first"
 class MotionOperator(UnitOperator):
     """An operator on the active unit whose study holds a motion."""
 
-    @classmethod
-    def trouble(cls, root):
-        return NO_MOTION if motion_parts.motion_of(root) is None else ""
+    trouble = unless(motion_parts.motion_of, NO_MOTION)
 
 
-class MU_OT_motion(MotionOperator, bpy.types.Operator):
-    """Show or hide the motion without a sensor or with a path, as mesh or as print"""
-
-    bl_idname = "mu.motion"
-    bl_label = "Show Motion"
-    bl_options = {"REGISTER", "UNDO"}
-
-    name: StringProperty(
+@operator(
+    MotionOperator,
+    "Show Motion",
+    name=StringProperty(
         name="Whose", description="`model_a`, the unit without a sensor, or a path's name", default=MODEL_A
-    )
-    what: EnumProperty(
+    ),
+    what=EnumProperty(
         name="Body",
         description="What moves",
         items=[
             (motion_parts.MESH, "Analysis Mesh", "The analysis mesh with its fields"),
             (motion_parts.PRINT, "Printable Solid", "The printable body, moved with the mesh"),
         ],
-    )
-    on: BoolProperty(name="Show", description="Show or hide it", default=True)
-    timeline: BoolProperty(
+    ),
+    on=BoolProperty(name="Show", description="Show or hide it", default=True),
+    timeline=BoolProperty(
         name="Fit Timeline", description="End the scene's timeline where the protocol ends", default=True
-    )
+    ),
+)
+def motion(context, root, name, what, on, timeline):
+    """Show or hide the motion without a sensor or with a path, as mesh or as print"""
+    motion = motion_parts.motion_of(root)
+    if name not in (MODEL_A, *motion.paths):
+        raise InputError(
+            f"there is no motion of {name!r}",
+            str(motion.folder),
+            f"choose one of {', '.join((MODEL_A, *motion.paths))}",
+        )
+    if not on:
+        motion_parts.hide(root, name, what)
+        return
+    if root.mu_motion.on_unit:
+        unit_object.hide_candidates(root)
+    motion_parts.show(root, name, what)
+    if timeline:
+        context.scene.frame_end = motion_parts.last_frame(motion, context.scene)
 
-    def act(self, context, root):
-        motion = motion_parts.motion_of(root)
-        if self.name not in (MODEL_A, *motion.paths):
-            raise InputError(
-                f"there is no motion of {self.name!r}",
-                str(motion.folder),
-                f"choose one of {', '.join((MODEL_A, *motion.paths))}",
-            )
-        if not self.on:
-            motion_parts.hide(root, self.name, self.what)
-            return {"FINISHED"}
-        if root.mu_motion.on_unit:
-            unit_object.hide_candidates(root)
-        motion_parts.show(root, self.name, self.what)
-        if self.timeline:
-            context.scene.frame_end = motion_parts.last_frame(motion, context.scene)
-        return {"FINISHED"}
 
-
-class MU_OT_motion_clear(UnitOperator, bpy.types.Operator):
+@operator(UnitOperator, "Clear Motion")
+def motion_clear(root):
     """Remove every motion of this unit from the scene; the study's files stay"""
-
-    bl_idname = "mu.motion_clear"
-    bl_label = "Clear Motion"
-    bl_options = {"REGISTER", "UNDO"}
-
-    def act(self, context, root):
-        for name, what in motion_parts.shown(root):
-            motion_parts.hide(root, name, what)
-        legend_object.hide(root)
+    for name, what in motion_parts.shown(root):
+        motion_parts.hide(root, name, what)
+    legend_object.hide(root)
 
 
-class MU_OT_motion_update(MotionOperator, bpy.types.Operator):
+@operator(MotionOperator, "Update Motion")
+def motion_update(root):
     """Rebuild the shown motion from the study's files, after another simulation"""
-
-    bl_idname = "mu.motion_update"
-    bl_label = "Update Motion"
-    bl_options = {"REGISTER", "UNDO"}
-
-    def act(self, context, root):
-        motion_parts.rebuild(root)
-        root.mu_motion.trouble = ""
+    motion_parts.rebuild(root)
+    root.mu_motion.trouble = ""
 
 
-class MU_OT_motion_range(MotionOperator, bpy.types.Operator):
+@operator(MotionOperator, "Fit Range")
+def motion_range(root):
     """Fit the range of the colours to the field over the whole motion"""
-
-    bl_idname = "mu.motion_range"
-    bl_label = "Fit Range"
-    bl_options = {"REGISTER", "UNDO"}
-
-    def act(self, context, root):
-        settings = root.mu_motion
-        settings.low, settings.high = motion_parts.extent(root, settings.field)
+    settings = root.mu_motion
+    settings.low, settings.high = motion_parts.extent(root, settings.field)
 
 
-class MU_OT_motion_legend(MotionOperator, bpy.types.Operator):
+@operator(
+    MotionOperator,
+    "Legend in Renders",
+    on=BoolProperty(name="Show", description="Show or hide it", default=True),
+)
+def motion_legend(root, on):
     """Add the legend to the scene next to the unit, so that renders show it, or remove it"""
-
-    bl_idname = "mu.motion_legend"
-    bl_label = "Legend in Renders"
-    bl_options = {"REGISTER", "UNDO"}
-
-    on: BoolProperty(name="Show", description="Show or hide it", default=True)
-
-    def act(self, context, root):
-        legend_object.show(root) if self.on else legend_object.hide(root)
+    legend_object.show(root) if on else legend_object.hide(root)
 
 
 class MU_OT_colours(bpy.types.Operator):
     """Let this 3D view show the colours of results: solid shading by attribute"""
 
-    bl_idname = "mu.colours"
     bl_label = "Show Colours"
     bl_options = {"REGISTER"}
 
@@ -136,6 +113,7 @@ class MU_OT_colours(bpy.types.Operator):
         return {"FINISHED"}
 
 
+@menu("VIEW3D_MT_editor_menus")
 def draw_colours(self, context) -> None:
     """Draw, in the header of a 3D view that cannot show the colours that are there, the button for it."""
     if not viewports.shows_colours(context) and any(map(places.coloured, unit_object.roots())):
@@ -144,49 +122,22 @@ def draw_colours(self, context) -> None:
         row.operator("mu.colours", icon="COLOR")
 
 
-class MU_OT_picture(UnitOperator, bpy.types.Operator):
-    """Open a picture of the study in a new image editor"""
-
-    bl_idname = "mu.picture"
-    bl_label = "Enlarge"
-    bl_options = {"REGISTER"}
-
-    name: StringProperty(name="Picture", description="Name of its file in the study's folder")
-
-    def act(self, context, root):
-        path = studies.results_folder(root) / FOLDER / self.name
-        if not self.name or not path.is_file():
-            raise InputError("there is no such picture", str(path), "simulate first")
-        image = bpy.data.images.load(str(path), check_existing=True)
-        image.reload()
-        if bpy.app.background:
-            return {"FINISHED"}
-        bpy.ops.wm.window_new()
-        area = context.window_manager.windows[-1].screen.areas[0]
-        area.type = "IMAGE_EDITOR"
-        area.spaces.active.image = image
-        return {"FINISHED"}
-
-
-CLASSES = (
-    MU_OT_motion,
-    MU_OT_motion_clear,
-    MU_OT_motion_update,
-    MU_OT_motion_range,
-    MU_OT_motion_legend,
-    MU_OT_colours,
-    MU_OT_picture,
+@operator(
+    UnitOperator,
+    "Enlarge",
+    undo=False,
+    name=StringProperty(name="Picture", description="Name of its file in the study's folder"),
 )
-_register_classes, _unregister_classes = bpy.utils.register_classes_factory(CLASSES)
-
-
-def register() -> None:
-    """Register operators, and the button in the headers of 3D views."""
-    _register_classes()
-    bpy.types.VIEW3D_MT_editor_menus.append(draw_colours)
-
-
-def unregister() -> None:
-    """Unregister them."""
-    bpy.types.VIEW3D_MT_editor_menus.remove(draw_colours)
-    _unregister_classes()
+def picture(context, root, name):
+    """Open a picture of the study in a new image editor"""
+    path = studies.results_folder(root) / FOLDER / name
+    if not name or not path.is_file():
+        raise InputError("there is no such picture", str(path), "simulate first")
+    image = bpy.data.images.load(str(path), check_existing=True)
+    image.reload()
+    if bpy.app.background:
+        return
+    bpy.ops.wm.window_new()
+    area = context.window_manager.windows[-1].screen.areas[0]
+    area.type = "IMAGE_EDITOR"
+    area.spaces.active.image = image

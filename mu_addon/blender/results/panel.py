@@ -8,10 +8,12 @@ import bpy
 
 from ...report.motion_files import FOLDER, MODEL_A
 from ...usecases.simulate_and_place.charts import ANGLE, delta_name
+from ..jobs.panel import open_buttons
 from ..shared.file_cache import icon_of
-from ..shared.panels import alert, wrapped
+from ..shared.panels import alert, plain_row, wrapped
 from ..shared.wording import path_symbol, sentence
 from ..simulate import study_folder as studies
+from ..simulate.job import SIMULATION
 from ..unit import object as unit_object
 from ..unit.base_classes import UnitPanel
 from . import field_colours, field_operators, legend_object, run_motions, run_panel
@@ -39,7 +41,6 @@ def _of(name: str) -> str:
 class MU_PT_results(UnitPanel, bpy.types.Panel):
     """Results of the study"""
 
-    bl_idname = "MU_PT_results"
     bl_label = "Results"
 
     def show(self, layout, context, root):
@@ -88,9 +89,7 @@ class MU_PT_results(UnitPanel, bpy.types.Panel):
             )
         if motion_parts.motion_of(root) is not None:
             _look_buttons(layout, root, bool(ranking))
-        row = layout.row(align=True)
-        row.operator("mu.open", text="Report", icon="URL").what = "report"
-        row.operator("mu.open", text="Folder", icon="FILE_FOLDER").what = "folder"
+        open_buttons(layout, SIMULATION)
 
 
 def _look_buttons(layout, root, ranked: bool) -> None:
@@ -102,16 +101,13 @@ def _look_buttons(layout, root, ranked: bool) -> None:
         cell = grid.row(align=True)
         cell.active = not field_operators.lacking(root, name)
         cell.operator("mu.field_show", text=text, depress=on).field = name
-    row = layout.row()
-    row.use_property_split = False
     text = "Ranking beside the Unit" if ranked else "Candidates beside the Unit"
-    row.prop(root.mu_unit, "candidates", text=text, toggle=True, icon="CURVE_PATH")
+    plain_row(layout).prop(root.mu_unit, "candidates", text=text, toggle=True, icon="CURVE_PATH")
 
 
 class MU_PT_warnings(UnitPanel, bpy.types.Panel):
     """Warnings about the results shown"""
 
-    bl_idname = "MU_PT_warnings"
     bl_label = "Warnings"
     bl_parent_id = "MU_PT_results"
     bl_options: ClassVar[set[str]] = set()
@@ -134,7 +130,6 @@ class MU_PT_warnings(UnitPanel, bpy.types.Panel):
 class MU_MT_motion(bpy.types.Menu):
     """Motions of the run: the unit without a sensor and with each path, as mesh and as print"""
 
-    bl_idname = "MU_MT_motion"
     bl_label = "Show"
 
     def draw(self, context):
@@ -168,7 +163,6 @@ class _OfMotion(UnitPanel):
 class MU_PT_motion(_OfMotion, bpy.types.Panel):
     """The motion on the timeline: the unit without a sensor and with any path, side by side"""
 
-    bl_idname = "MU_PT_motion"
     bl_label = "On the Model"
     bl_order = 1
 
@@ -202,7 +196,6 @@ class MU_PT_motion(_OfMotion, bpy.types.Panel):
 class MU_PT_field(_OfMotion, bpy.types.Panel):
     """The field shown by the colours, and its range"""
 
-    bl_idname = "MU_PT_field"
     bl_label = "Colours"
     bl_order = 2
 
@@ -213,9 +206,7 @@ class MU_PT_field(_OfMotion, bpy.types.Panel):
     def show(self, layout, context, root):
         settings = root.mu_motion
         # As wide as the panel: names of stresses are long.
-        row = layout.row()
-        row.use_property_split = False
-        row.prop(settings, "field", text="")
+        plain_row(layout).prop(settings, "field", text="")
         missing = [
             part.name for part in motion_parts.parts(root) if settings.field not in part.data.attributes
         ]
@@ -227,17 +218,14 @@ class MU_PT_field(_OfMotion, bpy.types.Panel):
         column = layout.column(align=True)
         column.prop(settings, "low", text=f"From ({unit})" if unit else "From")
         column.prop(settings, "high", text="To")
-        row = layout.row(align=True)
-        row.use_property_split = False
+        row = plain_row(layout)
         row.prop(settings, "lock", toggle=True, icon="LOCKED" if settings.lock else "UNLOCKED", text="Lock")
         row.prop(settings, "symmetric", toggle=True)
         row.operator("mu.motion_range", text="Fit")
-        row = layout.row(align=True)
-        row.use_property_split = False
+        row = plain_row(layout)
         row.prop(settings, "marker", toggle=True)
         row.operator("mu.probe", icon="EYEDROPPER")
-        row = layout.row(align=True)
-        row.use_property_split = False
+        row = plain_row(layout)
         row.prop(settings, "legend", toggle=True)
         there = legend_object.bar_of(root) is not None
         row.operator("mu.motion_legend", text="In Renders", icon="RENDER_STILL", depress=there).on = not there
@@ -246,7 +234,6 @@ class MU_PT_field(_OfMotion, bpy.types.Panel):
 class MU_PT_pictures(_OfMotion, bpy.types.Panel):
     """The angle over the pressure, and where and when the chosen path disturbs the motion"""
 
-    bl_idname = "MU_PT_pictures"
     bl_label = "Pictures"
     bl_order = 3
 
@@ -262,9 +249,3 @@ class MU_PT_pictures(_OfMotion, bpy.types.Panel):
             wrapped(layout, "This run made no pictures: run it again for them", "INFO")
         elif not root.mu_unit.path:
             wrapped(layout, "Choose a sensor path to see its deviation", "INFO")
-
-
-CLASSES = (MU_PT_results, MU_PT_warnings, MU_MT_motion, MU_PT_motion, MU_PT_field, MU_PT_pictures)
-
-
-register, unregister = bpy.utils.register_classes_factory(CLASSES)

@@ -13,7 +13,7 @@ from bpy_extras.view3d_utils import (
     region_2d_to_vector_3d,
 )
 
-from ..shared.viewports import Overlay
+from ..shared.registration import at_end, overlay
 from ..unit import object as unit_object
 from ..unit.base_classes import UnitPoll
 from . import field_colours, legend, places
@@ -42,16 +42,13 @@ def lines(root: Any, place: places.Place, scene: Any) -> list[str]:
         x, y, z = (float(v) + 0.0 for v in np.round(at, 2))
         found.append(f"{what}: x {x:.1f}, y {y:.1f}, z {z:.1f} mm")
     if motion is not None:
-        time = float(np.clip(motion_parts.time_of(motion, scene), motion.time_s[0], motion.time_s[-1]))
-        pressure = float(np.interp(time, motion.time_s, motion.pressure_kPa))
-        found.append(f"{whose}, {time:.2f} s, {pressure + 0.0:.1f} kPa")
+        found.append(f"{whose}, {motion_parts.moment(motion, scene)}")
     return found
 
 
 class MU_OT_probe(UnitPoll, bpy.types.Operator):
     """Read the field under the mouse: value, place and time. Esc or a right click ends it"""
 
-    bl_idname = "mu.probe"
     bl_label = "Probe"
     bl_options = {"REGISTER"}
 
@@ -122,6 +119,7 @@ def _inside(area: Any, x: int, y: int) -> bool:
     return bool(area.x <= x < area.x + area.width and area.y <= y < area.y + area.height)
 
 
+@overlay
 def _draw() -> None:
     context = bpy.context
     root = legend.subject(context)
@@ -155,18 +153,6 @@ def _mark(context: Any, root: Any, size: int) -> None:
     legend.write(text, x, at.y - 0.35 * size, size)
 
 
-_overlay = Overlay(_draw)
-_add, _remove = bpy.utils.register_classes_factory((MU_OT_probe,))
-
-
-def register() -> None:
-    """Register the operator and its drawing."""
-    _add()
-    _overlay.register()
-
-
-def unregister() -> None:
-    """Unregister them."""
+@at_end
+def _stop() -> None:
     MU_OT_probe.running = None
-    _overlay.unregister()
-    _remove()

@@ -7,7 +7,7 @@ from bpy.props import BoolProperty, EnumProperty, FloatProperty, StringProperty
 
 from ...errors import MuError
 from ..shared import updates, viewports
-from ..shared.registration import property_group_factory
+from ..shared.registration import property_of
 from ..unit import object as unit_object
 from . import field_colours
 from . import motion as motion_parts
@@ -54,6 +54,7 @@ def _apart(settings, context):
     motion_parts.arrange(settings.id_data)
 
 
+@property_of(bpy.types.Object, "mu_motion")
 class MU_PG_motion(bpy.types.PropertyGroup):
     """Display of the motion in a unit's study."""
 
@@ -122,6 +123,3 @@ class MU_PG_motion(bpy.types.PropertyGroup):
     trouble: StringProperty(
         name="Trouble", description="Why the motion could not be updated", options={"HIDDEN"}
     )
-
-
-register, unregister = property_group_factory(bpy.types.Object, "mu_motion", (MU_PG_motion,))

@@ -8,6 +8,7 @@ from bpy.props import StringProperty
 from ...errors import InputError
 from ...usecases.simulate_and_place import unit_runs
 from ..shared import updates
+from ..shared.operators import unless
 from ..simulate import study_folder as studies
 from ..unit import object as unit_object
 from ..unit.base_classes import UnitOperator
@@ -19,9 +20,7 @@ from . import runs
 class RunOperator(UnitOperator):
     """An operator on a run of the active unit: the one of its property `key`, else the shown one."""
 
-    @classmethod
-    def trouble(cls, root):
-        return "" if studies.runs_of(root) else "No run yet: simulate this unit first"
+    trouble = unless(studies.runs_of, "No run yet: simulate this unit first")
 
     def run_of(self, root):
         """The run; raises InputError."""
@@ -41,9 +40,7 @@ KEY = StringProperty(name="Run", description="Name of the run's folder; empty: t
 class MU_OT_run_show(RunOperator, bpy.types.Operator):
     """Show the results of this run, until the unit's parameters change"""
 
-    bl_idname = "mu.run_show"
     bl_label = "Show Run"
-    bl_options = {"REGISTER", "UNDO"}
 
     key: KEY
 
@@ -54,9 +51,7 @@ class MU_OT_run_show(RunOperator, bpy.types.Operator):
 class MU_OT_run_compare(RunOperator, bpy.types.Operator):
     """Compare the shown run with this one, side by side and on the model; again to stop comparing"""
 
-    bl_idname = "mu.run_compare"
     bl_label = "Compare"
-    bl_options = {"REGISTER", "UNDO"}
 
     key: KEY
 
@@ -72,9 +67,7 @@ class MU_OT_run_compare(RunOperator, bpy.types.Operator):
 class MU_OT_run_restore(RunOperator, bpy.types.Operator):
     """Give the unit the parameters that this run was made with"""
 
-    bl_idname = "mu.run_restore"
     bl_label = "Use Its Parameters"
-    bl_options = {"REGISTER", "UNDO"}
 
     key: KEY
 
@@ -98,7 +91,6 @@ class MU_OT_run_restore(RunOperator, bpy.types.Operator):
 class MU_OT_run_remove(RunOperator, bpy.types.Operator):
     """Delete this run's files from the disk, which cannot be undone"""
 
-    bl_idname = "mu.run_remove"
     bl_label = "Delete Run"
     bl_options = {"REGISTER"}
 
@@ -131,9 +123,3 @@ class MU_OT_run_remove(RunOperator, bpy.types.Operator):
                 motion_parts.hide(root, name, what)
         runs.refresh()
         unit_object.rebuild(root)
-
-
-CLASSES = (MU_OT_run_show, MU_OT_run_compare, MU_OT_run_restore, MU_OT_run_remove)
-
-
-register, unregister = bpy.utils.register_classes_factory(CLASSES)

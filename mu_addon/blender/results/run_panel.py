@@ -27,8 +27,6 @@ COLUMN = 8
 class MU_UL_runs(bpy.types.UIList):
     """Runs: star, name, best path or angle, and which one to compare with."""
 
-    bl_idname = "MU_UL_runs"
-
     def draw_item(self, context, layout, data, item, icon, active_data, active_property, index=0, flt_flag=0):
         root = unit_object.active_root(context)
         run = None if root is None else studies.run_by_key(root, item.key)
@@ -83,7 +81,6 @@ def draw_runs(layout, root) -> None:
 class MU_PT_comparison(UnitPanel, bpy.types.Panel):
     """Compare the shown run with another one: parameters that differ, angles, J, time"""
 
-    bl_idname = "MU_PT_comparison"
     bl_parent_id = "MU_PT_results"
     bl_label = "Comparison"
     bl_options: ClassVar[set[str]] = set()
@@ -126,9 +123,3 @@ def _row(column, what: str, one: str, other: str) -> None:
     split = split.split(factor=0.5)
     split.label(text=one.replace("alpha", "α"))
     split.label(text=other.replace("alpha", "α"))
-
-
-CLASSES = (MU_UL_runs, MU_PT_comparison)
-
-
-register, unregister = bpy.utils.register_classes_factory(CLASSES)

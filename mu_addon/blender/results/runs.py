@@ -3,14 +3,13 @@
 # Blender reads the annotations themselves: no `from __future__ import annotations` here.
 
 import bpy
-from bpy.app.handlers import persistent
-from bpy.props import BoolProperty, CollectionProperty, IntProperty, PointerProperty, StringProperty
+from bpy.props import BoolProperty, CollectionProperty, IntProperty, StringProperty
 
 from ...errors import MuError
 from ...usecases.simulate_and_place import unit_runs
 from ..jobs.start_child import JOB_ENDED
 from ..shared import viewports
-from ..shared.registration import add_handlers, remove_handlers
+from ..shared.registration import connected, handler, property_of, timer
 from ..simulate import study_folder as studies
 from ..unit import object as unit_object
 from . import motion as motion_parts
@@ -81,8 +80,9 @@ def _choose(listed, value: int) -> None:
         show(root, listed.entries[value].key)
 
 
+@property_of(bpy.types.WindowManager, "mu_runs")
 class MU_PG_runs(bpy.types.PropertyGroup):
-    """The list of the active unit's runs, read from their folders."""
+    """Runs of the active unit, read from their folders: no file keeps the list, and undo leaves it alone."""
 
     entries: CollectionProperty(type=MU_PG_run, description="Runs, the latest first")
     index: IntProperty(
@@ -110,8 +110,8 @@ def show(root, key: str) -> bool:
 def listed():
     """The list, scheduled for an update if it is behind; for a panel, which may not write itself."""
     found = bpy.context.window_manager.mu_runs
-    if _behind() and not bpy.app.timers.is_registered(_later):
-        bpy.app.timers.register(_later, first_interval=0.0)
+    if _behind():
+        _later.soon()
     return found
 
 
@@ -120,11 +120,14 @@ def _behind() -> bool:
     return [entry.key for entry in entries] != [run.key for run in of_active()[1]]
 
 
+@timer()
 def _later() -> None:
     refresh()
     viewports.redraw()
 
 
+@connected(JOB_ENDED)
+@handler("load_post")
 def refresh(*_) -> None:
     """List the runs of the active unit."""
     if not _behind():
@@ -133,30 +136,3 @@ def refresh(*_) -> None:
     entries.clear()
     for run in of_active()[1]:
         entries.add().key = run.key
-
-
-@persistent
-def _loaded(*_):
-    refresh()
-
-
-_HANDLERS = {"load_post": _loaded}
-_add, _remove = bpy.utils.register_classes_factory((MU_PG_run, MU_PG_runs))
-
-
-def register() -> None:
-    """Register the list on the window manager: no file keeps it, and undo leaves it alone."""
-    _add()
-    bpy.types.WindowManager.mu_runs = PointerProperty(type=MU_PG_runs)
-    add_handlers(_HANDLERS)
-    JOB_ENDED.connect(refresh)
-
-
-def unregister() -> None:
-    """Unregister it."""
-    JOB_ENDED.disconnect(refresh)
-    remove_handlers(_HANDLERS)
-    if bpy.app.timers.is_registered(_later):
-        bpy.app.timers.unregister(_later)
-    del bpy.types.WindowManager.mu_runs
-    _remove()

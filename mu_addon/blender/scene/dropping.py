@@ -44,7 +44,6 @@ class _Dropped:
 class MU_OT_drop_toml(_Dropped, bpy.types.Operator):
     """Add the unit that a TOML file describes where it is dropped, or open the node tree that it holds"""
 
-    bl_idname = "mu.drop_toml"
     bl_label = "Unit or Node Tree"
 
     place: FloatVectorProperty(
@@ -69,8 +68,6 @@ class MU_OT_drop_toml(_Dropped, bpy.types.Operator):
             bpy.ops.mu.tree_load(filepath=str(path))
             return {"FINISHED"}
         unit = read_unit(path)
-        if context.mode != "OBJECT":
-            bpy.ops.object.mode_set(mode="OBJECT")
         root = unit_object.create(context, unit)
         if self.properties.is_property_set("place"):
             root.location = self.place
@@ -91,11 +88,7 @@ class _Surface(_Dropped, UnitOperator):
         context.collection.objects.link(obj)
         obj.matrix_world = root.matrix_world
         context.view_layer.update()
-        for other in context.selected_objects:
-            other.select_set(False)
-        obj.select_set(True)
-        root.select_set(True)
-        context.view_layer.objects.active = root
+        viewports.select(context, [obj, root], root)
         try:
             done = self.use()
         except RuntimeError as error:
@@ -108,7 +101,6 @@ class _Surface(_Dropped, UnitOperator):
 class MU_OT_drop_envelope(_Surface, bpy.types.Operator):
     """Add a closed surface from a file, in mm in the unit's frame, and have the lattice fill it"""
 
-    bl_idname = "mu.drop_envelope"
     bl_label = "Envelope of the Unit"
 
     def use(self):
@@ -119,7 +111,6 @@ class MU_OT_drop_envelope(_Surface, bpy.types.Operator):
 class MU_OT_drop_obstacle(_Surface, bpy.types.Operator):
     """Add a closed surface from a file, in mm in the unit's frame, as an obstacle of the unit"""
 
-    bl_idname = "mu.drop_obstacle"
     bl_label = "Obstacle of the Unit"
 
     def use(self):
@@ -130,7 +121,6 @@ class MU_OT_drop_obstacle(_Surface, bpy.types.Operator):
 class MU_FH_toml(bpy.types.FileHandler):
     """Units and node trees"""
 
-    bl_idname = "MU_FH_toml"
     bl_label = "Monolithic Unit or Node Tree"
     bl_import_operator = "mu.drop_toml"
     bl_file_extensions = ".toml"
@@ -152,7 +142,6 @@ class _SurfaceHandler:
 class MU_FH_envelope(_SurfaceHandler, bpy.types.FileHandler):
     """Envelopes"""
 
-    bl_idname = "MU_FH_envelope"
     bl_label = "Envelope of the Unit"
     bl_import_operator = "mu.drop_envelope"
 
@@ -160,19 +149,5 @@ class MU_FH_envelope(_SurfaceHandler, bpy.types.FileHandler):
 class MU_FH_obstacle(_SurfaceHandler, bpy.types.FileHandler):
     """Obstacles"""
 
-    bl_idname = "MU_FH_obstacle"
     bl_label = "Obstacle of the Unit"
     bl_import_operator = "mu.drop_obstacle"
-
-
-CLASSES = (
-    MU_OT_drop_toml,
-    MU_OT_drop_envelope,
-    MU_OT_drop_obstacle,
-    MU_FH_toml,
-    MU_FH_envelope,
-    MU_FH_obstacle,
-)
-
-
-register, unregister = bpy.utils.register_classes_factory(CLASSES)

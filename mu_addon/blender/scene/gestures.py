@@ -13,7 +13,6 @@ from collections.abc import Iterator
 from typing import Any
 
 import bpy
-from bpy.app.handlers import persistent
 
 from ...design.anchors import windows
 from ..gripper import object as gripper_object
@@ -22,7 +21,7 @@ from ..preview import nodes
 from ..preview.nodes import unit as unit_group
 from ..results import motion
 from ..shared import displays, scene_units, updates, viewports
-from ..shared.registration import add_handlers, remove_handlers
+from ..shared.registration import connected, handler
 from ..unit import broken, preview_update
 from ..unit import object as unit_object
 
@@ -35,7 +34,9 @@ _SESSION = uuid.uuid4()
 _looking = False
 
 
-def look() -> None:
+@connected(scene_units.CHANGED)
+@handler("undo_post", "redo_post")
+def look(*_: Any) -> None:
     """Repair the effects of the last gesture."""
     global _looking
     if _looking:
@@ -222,28 +223,19 @@ def _rebuild(root: Any) -> None:
         gripper_object.rebuild(root)
 
 
-def _units_changed(_scene: Any) -> None:
-    look()
-
-
-@persistent
+@handler("depsgraph_update_post")
 def _after_update(scene: Any, depsgraph: Any) -> None:
     if any(depsgraph.id_type_updated(kind) for kind in ("OBJECT", "SCENE", "COLLECTION", "MESH")):
         look()
 
 
-@persistent
-def _after_undo(*_: Any) -> None:
-    look()
-
-
-@persistent
+@handler("load_post")
 def _after_load(*_: Any) -> None:
     broken.forget()
     look()
 
 
-@persistent
+@handler("blend_import_post")
 def _after_import(imported: Any) -> None:
     """Give appended units an identity other than in the file that they come from."""
     _size_instances({item.id for item in imported.import_items if isinstance(item.id, bpy.types.Collection)})
@@ -272,23 +264,3 @@ def _size_instances(collections: set[Any]) -> None:
         roots = [o for o in obj.instance_collection.all_objects if o.type == "MESH" and displays.uuid_of(o)]
         if roots and all(roots[0].lock_scale):
             obj.scale = (wanted / roots[0].scale.x,) * 3
-
-
-_HANDLERS = {
-    "depsgraph_update_post": _after_update,
-    "undo_post": _after_undo,
-    "redo_post": _after_undo,
-    "load_post": _after_load,
-    "blend_import_post": _after_import,
-}
-_CONNECTIONS = ((scene_units.CHANGED, _units_changed),)
-
-
-def register() -> None:
-    """Register handlers that check after every gesture."""
-    add_handlers(_HANDLERS, _CONNECTIONS)
-
-
-def unregister() -> None:
-    """Unregister them."""
-    remove_handlers(_HANDLERS, _CONNECTIONS)

@@ -21,9 +21,10 @@ from ...errors import InputError
 from ..live_bending import state as live
 from ..results import motion as motion_parts
 from ..results.operators import NO_MOTION
-from ..shared import viewports
+from ..shared import timeline, viewports
 from ..shared.blender_property import step_of
 from ..shared.displays import editable
+from ..shared.registration import at_end, at_start
 from ..shared.wording import in_panel, label
 from ..unit import object as unit_object
 from ..unit.base_classes import UnitPoll
@@ -100,8 +101,7 @@ def to_pressure(root: Any, scene: Any, kPa: float) -> None:
     motion = motion_parts.motion_of(root)
     assert motion is not None
     frames = np.arange(scene.frame_start, motion_parts.last_frame(motion, scene) + 1)
-    rate = scene.render.fps / scene.render.fps_base
-    times = motion.time_s[0] + (frames - scene.frame_start) / rate
+    times = motion.time_s[0] + timeline.seconds_at(scene, frames)
     off = np.abs(np.interp(times, motion.time_s, motion.pressure_kPa) - kPa)
     near = frames[off <= off.min() + 0.25 * float(np.ptp(motion.pressure_kPa)) / max(len(frames), 1)]
     scene.frame_set(int(near[np.abs(near - scene.frame_current).argmin()]))
@@ -119,7 +119,6 @@ def usable(root: Any | None, name: str) -> bool:
 class MU_OT_drag(UnitPoll, bpy.types.Operator):
     """Drag this with the mouse; Shift: finely, Ctrl: in whole steps, Esc or a right click: as it was"""
 
-    bl_idname = "mu.drag"
     bl_label = "Drag"
     bl_options = {"REGISTER", "UNDO", "BLOCKING", "GRAB_CURSOR"}
 
@@ -234,7 +233,6 @@ def _place(root: Any, name: str, dimensions: Dimensions) -> tuple[Vector, Vector
 class MU_GGT_handles(bpy.types.GizmoGroup):
     """Arrows on the active unit: wall, bladder, cell; on its result the pressure"""
 
-    bl_idname = "MU_GGT_handles"
     bl_label = "Sizes of the Unit"
     bl_space_type, bl_region_type = "VIEW_3D", "WINDOW"
     bl_options = {"3D", "PERSISTENT", "SHOW_MODAL_ALL"}
@@ -298,18 +296,13 @@ class MU_WT_size(bpy.types.WorkSpaceTool):
             layout.prop(*parameter_of(root, HANDLES[chosen.what]), text="")
 
 
-_add_classes, _remove_classes = bpy.utils.register_classes_factory((MU_OT_drag, MU_GGT_handles))
-
-
-def register() -> None:
-    """Register arrows and tool; in background there is no toolbar."""
-    _add_classes()
-    if not bpy.app.background:
+@at_start
+def _add_tool() -> None:
+    if not bpy.app.background:  # where there is no toolbar
         bpy.utils.register_tool(MU_WT_size, after={"builtin.transform"}, separator=True)
 
 
-def unregister() -> None:
-    """Unregister it."""
+@at_end
+def _remove_tool() -> None:
     if not bpy.app.background:
         bpy.utils.unregister_tool(MU_WT_size)
-    _remove_classes()

@@ -10,7 +10,6 @@ from pathlib import Path
 from typing import Any
 
 import bpy
-from bpy.app.handlers import persistent
 
 from ...errors import MuError
 from ...usecases.simulate_and_place import unit_runs
@@ -18,7 +17,7 @@ from ..gripper import object as gripper_object
 from ..gripper import state as grasps
 from ..shared import displays
 from ..shared.compat import user_folder
-from ..shared.registration import add_handlers, remove_handlers
+from ..shared.registration import at_end, handler
 from ..simulate import study_folder as studies
 from ..unit import object as unit_object
 
@@ -33,7 +32,7 @@ def _owners() -> list[tuple[Any, Any, Any, Path]]:
     return [owner for owner in (*units, *grippers) if owner[2].folder]
 
 
-@persistent
+@handler("save_pre")
 def _before_save(path: str = "", *_: Any) -> None:
     _homes.clear()
     # Nothing for the startup file, which has no path.
@@ -47,7 +46,7 @@ def _before_save(path: str = "", *_: Any) -> None:
         named.folder = _way(home, blend)
 
 
-@persistent
+@handler("save_post")
 def _after_save(*_: Any) -> None:
     # A copy is saved elsewhere, and this file keeps its path.
     for _root, props, named, _home in _owners():
@@ -85,7 +84,7 @@ def _way(home: Path, blend: Path) -> str:
         return str(home)
 
 
-@persistent
+@handler("load_post")
 def _loaded(*_: Any) -> None:
     """Find point caches whose path has changed with the file, in the folder of their run."""
     for root in (*unit_object.roots(), *gripper_object.roots()):
@@ -108,15 +107,6 @@ def _cache_of(part: Any) -> Any:
     return found if found is not None and found.type == "MESH_CACHE" else None
 
 
-_HANDLERS = {"save_pre": _before_save, "save_post": _after_save, "load_post": _loaded}
-
-
-def register() -> None:
-    """Register handlers of saving and loading."""
-    add_handlers(_HANDLERS)
-
-
-def unregister() -> None:
-    """Unregister them."""
-    remove_handlers(_HANDLERS)
+@at_end
+def _forget() -> None:
     _homes.clear()

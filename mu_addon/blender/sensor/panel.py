@@ -11,7 +11,7 @@ from ...design.printing.finding import counted
 from ...run.child import FAILED
 from ...sensing.session import LOSSES
 from ..jobs.panel import job_state
-from ..shared.panels import alert, large_button, wrapped
+from ..shared.panels import alert, fold, large_button, plain_row, wrapped
 from ..shared.wording import in_panel
 from ..simulate import study_folder as studies
 from ..unit.base_classes import UnitPanel
@@ -32,7 +32,6 @@ STATES = {
 class MU_PT_sensor(UnitPanel, bpy.types.Panel):
     """The real sensor: connect, record, calibrate, and bend the twin by it"""
 
-    bl_idname = "MU_PT_sensor"
     bl_label = "Sensor on the Bench"
 
     def show(self, layout, context, root):
@@ -140,13 +139,11 @@ def _format(status) -> str:
 
 
 def _plot(layout, settings, session):
-    header, body = layout.panel("MU_sensor_plot", default_closed=True)
-    header.label(text="Plot")
+    body = fold(layout, "MU_sensor_plot", "Plot")
     if not body:
         return
     running = session is not None and session.running
-    row = body.row(align=True)
-    row.use_property_split = False
+    row = plain_row(body)
     row.prop(settings, "plot", toggle=True)
     row = row.row(align=True)
     row.enabled = running
@@ -162,8 +159,7 @@ def _plot(layout, settings, session):
 
 def _calibration(layout, root, session):
     settings = root.mu_sensor
-    header, body = layout.panel("MU_sensor_calibration")
-    header.label(text="Calibration")
+    body = fold(layout, "MU_sensor_calibration", "Calibration", closed=False)
     if not body:
         return
     found, trouble = sensor.calibration(root)
@@ -231,8 +227,7 @@ def _guide(layout, guide):
 
 
 def _twin(layout, root):
-    header, body = layout.panel("MU_sensor_twin")
-    header.label(text="Twin")
+    body = fold(layout, "MU_sensor_twin", "Twin", closed=False)
     if not body:
         return
     on = bool(twin.parts(root))
@@ -247,9 +242,3 @@ def _twin(layout, root):
         found = studies.findings(root)
         if found is not None and found.stale:
             wrapped(body, "Its motion is of other parameters: simulate again", "ERROR")
-
-
-CLASSES = (MU_PT_sensor,)
-
-
-register, unregister = bpy.utils.register_classes_factory(CLASSES)

@@ -19,7 +19,7 @@ from mathutils import Vector
 from ...usecases.sensor.traces import steady_range, unbroken
 from ..results import legend
 from ..results.legend import TEXT, ticks, write
-from ..shared.viewports import Overlay
+from ..shared.registration import overlay
 from ..unit import object as unit_object
 from . import state as sensor
 from . import twin
@@ -43,6 +43,7 @@ GAP_S = 0.5
 """Pause in s, or five samples', across which no curve is drawn."""
 
 
+@overlay
 def _draw() -> None:
     context = bpy.context
     root = unit_object.active_root(context)
@@ -191,7 +192,3 @@ def _over_twin(context: Any, root: Any, scale: float) -> None:
     for line, text in enumerate((words, title)):
         blf.size(0, size)
         write(text, place.x - blf.dimensions(0, text)[0] / 2, place.y + 1.5 * size * line, size, colour)
-
-
-_overlay = Overlay(_draw)
-register, unregister = _overlay.register, _overlay.unregister

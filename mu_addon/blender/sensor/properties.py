@@ -6,9 +6,8 @@ import bpy
 from bpy.props import BoolProperty, EnumProperty, FloatProperty, IntProperty, StringProperty
 
 from ...sensing.settings import BAUD, PORT, SPEED
-from ..shared.blender_property import blender_property
-from ..shared.registration import property_group_factory
-from ..unit.properties import BESIDE_BLEND_FILE
+from ..shared.blender_property import blender_property, path_property
+from ..shared.registration import property_of
 from . import state as sensor
 
 
@@ -27,6 +26,7 @@ def _again(group, context):
         session.traces = None
 
 
+@property_of(bpy.types.Object, "mu_sensor")
 class MU_PG_sensor(bpy.types.PropertyGroup):
     """Connection, calibration and display of a unit's sensor."""
 
@@ -41,12 +41,7 @@ class MU_PG_sensor(bpy.types.PropertyGroup):
     )
     port: blender_property(PORT, search=_ports, search_options={"SUGGESTION"})
     baud: blender_property(BAUD, name="Baud")
-    replay: StringProperty(
-        name="Recording",
-        description="Folder of the recording to play",
-        subtype="DIR_PATH",
-        options=BESIDE_BLEND_FILE,
-    )
+    replay: path_property("Recording", "Folder of the recording to play", folder=True)
     speed: blender_property(SPEED._replace(low=0.01, high=100.0), precision=2)
     channel: StringProperty(
         name="Light",
@@ -60,17 +55,11 @@ class MU_PG_sensor(bpy.types.PropertyGroup):
         search=_channels,
         search_options={"SUGGESTION"},
     )
-    calibration: StringProperty(
-        name="Calibration",
-        description="A calibration.toml. Empty: the one that was made for this unit",
-        subtype="FILE_PATH",
-        options=BESIDE_BLEND_FILE,
+    calibration: path_property(
+        "Calibration", "A calibration.toml. Empty: the one that was made for this unit"
     )
-    data: StringProperty(
-        name="Sweeps",
-        description="Folder of a recording with angles marked, or of measured data",
-        subtype="DIR_PATH",
-        options=BESIDE_BLEND_FILE,
+    data: path_property(
+        "Sweeps", "Folder of a recording with angles marked, or of measured data", folder=True
     )
     plot: BoolProperty(name="Plot", description="Draw the signal in the viewport", default=True)
     seconds: FloatProperty(
@@ -94,6 +83,3 @@ class MU_PG_sensor(bpy.types.PropertyGroup):
         min=2,
     )
     known_deg: FloatProperty(name="Angle (deg)", description="The angle at which the unit is held now")
-
-
-register, unregister = property_group_factory(bpy.types.Object, "mu_sensor", (MU_PG_sensor,))

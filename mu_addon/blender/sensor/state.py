@@ -13,7 +13,6 @@ from typing import Any
 
 import bpy
 import numpy as np
-from bpy.app.handlers import persistent
 
 from ...errors import InputError, MuError
 from ...run.child import DONE, FAILED, RUNNING
@@ -25,7 +24,7 @@ from ..jobs import start_child
 from ..jobs.start_child import JobKind
 from ..shared import viewports
 from ..shared.file_cache import FileCache
-from ..shared.registration import add_handlers, remove_handlers
+from ..shared.registration import at_end, handler, timer
 from ..simulate import study_folder as studies
 from . import twin
 from .session import Session
@@ -98,7 +97,7 @@ def connect(root: Any) -> Session:
         before.watched.close()
     child = start_child.start(line, folder, ends_with_parent=True)
     _sessions[uuid] = Session(child, Watched(folder))
-    _tick()
+    _poll.soon(INTERVAL_S)
     return _sessions[uuid]
 
 
@@ -161,7 +160,9 @@ def latest_calibration(root: Any) -> Path:
     return max(folder.glob("*/"), default=folder)
 
 
-CALIBRATION = JobKind("calibrate", lambda root: root.mu_unit.uuid, latest_calibration, "calibration")
+CALIBRATION = JobKind(
+    "calibrate", lambda root: root.mu_unit.uuid, latest_calibration, "calibration", prefix="sensor_"
+)
 
 
 def calibrate(root: Any, data: Path) -> None:
@@ -172,7 +173,7 @@ def calibrate(root: Any, data: Path) -> None:
     inputs = Calibrate(data=(data,), channel=light, dark=str(dark) if dark else "").texts()
     CALIBRATION.start(root, folder, lambda folder: write_run(folder, Calibrate.layout(), inputs))
     _calibrating[CALIBRATION.key(root)] = folder
-    _tick()
+    _poll.soon(INTERVAL_S)
 
 
 def zero(root: Any, angle_deg: float) -> None:
@@ -278,53 +279,34 @@ def _apply_finished(key: str, folder: Path) -> bool:
     return True
 
 
+@timer(lasts=True)
 def _poll() -> float | None:
     sampled, news = poll()
     if sampled or news:
-        viewports.redraw_views(panels=news)
+        viewports.redraw_regions("WINDOW", *["UI"] * news)
     busy = _calibrating or any(session.running for session in _sessions.values())
     return INTERVAL_S if busy else None
 
 
-def _tick() -> None:
-    if not bpy.app.timers.is_registered(_poll):
-        # Persistent: loading another file does not end a session.
-        bpy.app.timers.register(_poll, first_interval=INTERVAL_S, persistent=True)
-
-
-@persistent
+@handler("render_init")
 def _render_began(*_: Any) -> None:
     # While a render reads the scene, it must not change.
     global _rendering
     _rendering = True
 
 
-@persistent
+@handler("render_complete", "render_cancel")
 def _render_ended(*_: Any) -> None:
     global _rendering
     _rendering = False
 
 
-_HANDLERS = {
-    "render_init": _render_began,
-    "render_complete": _render_ended,
-    "render_cancel": _render_ended,
-}
-
-
-def register() -> None:
-    """Register the handlers."""
-    add_handlers(_HANDLERS)
-
-
-def unregister() -> None:
-    """End every session, and unregister the handlers."""
+@at_end
+def _end_all() -> None:
+    """End every session."""
     for uuid in _sessions:
         disconnect(uuid)
     for session in _sessions.values():
         session.watched.close()
     _sessions.clear()
     _calibrating.clear()
-    if bpy.app.timers.is_registered(_poll):
-        bpy.app.timers.unregister(_poll)
-    remove_handlers(_HANDLERS)

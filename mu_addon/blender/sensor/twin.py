@@ -10,18 +10,17 @@ from pathlib import Path
 from typing import Any
 
 import attrs
-import bpy
 import numpy as np
-from bpy.app.handlers import persistent
 
 from ...errors import InputError
-from ...report.motion_files import REGIONS, Motion
+from ...report.motion_files import Motion
 from ...usecases.simulate_and_place.poses import Poses, poses
-from ..preview import materials, skeletons
+from ..preview import materials
+from ..results import bodies
 from ..results import motion as motion_parts
 from ..shared import displays
 from ..shared.displays import TWIN
-from ..shared.registration import add_handlers, remove_handlers
+from ..shared.registration import at_end, handler
 from ..simulate import study_folder as studies
 from ..unit import object as unit_object
 
@@ -47,7 +46,7 @@ _status: dict[str, tuple[str, str]] = {}
 
 def parts(root: Any) -> list[Any]:
     """The objects of a unit's twin: one a region."""
-    return [child for child in root.children if child.get(TWIN)]
+    return displays.parts(root, TWIN)
 
 
 def status(root: Any) -> tuple[str, str]:
@@ -66,12 +65,7 @@ def _shape(root: Any) -> _Shape:
     cut = bool(root.mu_motion.cut and motion.halved)
     kept = _shapes.get((motion.folder, cut))
     if kept is None or kept.motion is not motion:
-        vertices, triangles = {}, {}
-        for region in REGIONS:
-            skin = motion.skin(region, cut)
-            moved = skin.of_nodes(motion.mesh.nodes) + skin.of_nodes(motion.model_a)
-            vertices[region], triangles[region] = moved.astype(np.float32), skin.triangles
-        kept = _shapes[motion.folder, cut] = _Shape(motion, poses(motion), vertices, triangles)
+        kept = _shapes[motion.folder, cut] = _Shape(motion, poses(motion), *bodies.of_motion(motion, cut))
     return kept
 
 
@@ -81,12 +75,8 @@ def show(root: Any) -> None:
     hide(root)
     wide = float(np.ptp(shape.motion.mesh.nodes[:, 1]))
     rest = int(np.argmin(np.abs(shape.motion.state_kPa)))
-    for region in REGIONS:
-        title = f"Twin {region}"
-        part = displays.lock(displays.add(root, TWIN, region, bpy.data.meshes.new(title)))
-        skeletons.write(
-            part.data, skeletons.Skeleton(shape.vertices[region][rest], faces=(shape.triangles[region],))
-        )
+    at_rest = {region: vertices[rest] for region, vertices in shape.vertices.items()}
+    for part in bodies.put(root, TWIN, "Twin", at_rest, shape.triangles):
         part.location = (0.0, 1.5 * wide, 0.0)
     _status.pop(root.mu_unit.uuid, None)
     _colour(root, WAITING)
@@ -94,8 +84,7 @@ def show(root: Any) -> None:
 
 def hide(root: Any) -> None:
     """Remove the twin from the scene."""
-    for part in parts(root):
-        displays.remove(part)
+    displays.clear(root, TWIN)
 
 
 def set_pose(root: Any, reading: Any, fresh: bool) -> bool:
@@ -129,11 +118,8 @@ def _bend(root: Any, shape: _Shape, reading: Any) -> tuple[str, str]:
     first, second, share = place
     for part in parts(root):
         moved = shape.vertices[part[TWIN]]
-        if len(part.data.vertices) != moved.shape[1]:
+        if not bodies.move(part, moved[first] + np.float32(share) * (moved[second] - moved[first])):
             return WAITING, "the simulation has changed: show the twin again"
-        now = moved[first] + np.float32(share) * (moved[second] - moved[first])
-        part.data.attributes["position"].data.foreach_set("vector", now.ravel())
-        part.data.update()
     pressure = shape.poses.pressure_at(reading.angle_deg)
     half = (reading.high_deg - reading.low_deg) / 2
     return LIVE, f"{reading.angle_deg:.1f} ± {half:.1f}°, simulated at {pressure:.1f} kPa"
@@ -146,25 +132,15 @@ def _colour(root: Any, state: str) -> None:
         materials.wear(part.data, materials.material(name))
 
 
-@persistent
+@handler("load_post")
 def _loaded(*_: Any) -> None:
     """Mark a twin loaded from a file as without signal, unless its session still runs."""
-    _shapes.clear()
-    _status.clear()
+    _forget()
     for root in unit_object.roots():
         _colour(root, WAITING)
 
 
-_HANDLERS = {"load_post": _loaded}
-
-
-def register() -> None:
-    """Register the handler for loading."""
-    add_handlers(_HANDLERS)
-
-
-def unregister() -> None:
-    """Unregister it."""
-    remove_handlers(_HANDLERS)
+@at_end
+def _forget() -> None:
     _shapes.clear()
     _status.clear()

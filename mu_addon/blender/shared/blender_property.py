@@ -8,6 +8,8 @@ metric units when typed; fields of lengths here use that subtype.
 # Blender reads the annotations themselves: no `from __future__ import annotations` here.
 
 import textwrap
+from collections.abc import Callable
+from typing import Any
 from zlib import crc32
 
 import numpy as np
@@ -18,6 +20,8 @@ from .wording import choice_label, label, tooltip
 
 MILLIMETRES = "DISTANCE_CAMERA"
 """Subtype of a property that is in millimetres in any scene."""
+BESIDE_BLEND_FILE = {"PATH_SUPPORTS_BLEND_RELATIVE"}
+"""Options of a path that may be relative to the .blend file."""
 MOST_INT = 2**31 - 1
 """The largest whole number of a property in Blender."""
 
@@ -65,3 +69,24 @@ def step_of(high_mm: float) -> int:
 def millimetres(step: float, **shared):
     """A property in true millimetres; step: change in hundredths of one by a drag of a pixel."""
     return FloatProperty(subtype=MILLIMETRES, precision=3, step=step, **shared)
+
+
+def path_property(name: str, description: str, folder: bool = False, **more):
+    """A property that is the path of a file or a folder, relative to the .blend file if the user wants it."""
+    subtype = "DIR_PATH" if folder else "FILE_PATH"
+    return StringProperty(
+        name=name, description=description, subtype=subtype, options=BESIDE_BLEND_FILE, **more
+    )
+
+
+def listed(
+    make: Callable[[], list[tuple[str, str, str]]],
+) -> Callable[[Any, Any], list[tuple[str, str, str]]]:
+    """Items of a menu that are made anew each time it opens; Blender does not keep their strings alive."""
+    kept: list[tuple[str, str, str]] = []
+
+    def items(owner: Any, context: Any) -> list[tuple[str, str, str]]:
+        kept[:] = make()
+        return kept
+
+    return items

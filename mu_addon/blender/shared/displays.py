@@ -39,9 +39,25 @@ ON_UNIT = "mu_on_unit"
 """On a hidden motion's object: the unit shows it in its place."""
 
 
+def parts(root: Any, mark: str) -> list[Any]:
+    """Displays of a root with a mark."""
+    return [child for child in root.children if child.get(mark)]
+
+
+def part(root: Any, mark: str, value: str) -> Any | None:
+    """A root's display with that value of a mark, or None."""
+    return next((child for child in root.children if child.get(mark) == value), None)
+
+
+def clear(root: Any, mark: str) -> None:
+    """Remove the displays of a root with a mark."""
+    for one in parts(root, mark):
+        remove(one)
+
+
 def on_unit(root: Any, mark: str = MOTION) -> list[Any]:
     """Objects with a mark whose shape a unit shows in its place, by name."""
-    found = (child for child in root.children if child.get(mark) and child.get(ON_UNIT))
+    found = (child for child in parts(root, mark) if child.get(ON_UNIT))
     return sorted(found, key=lambda child: str(child.name))
 
 

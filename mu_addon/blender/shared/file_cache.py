@@ -12,6 +12,7 @@ from typing import Any, Generic, TypeVar
 import bpy.utils.previews
 
 from ...errors import MuError
+from .registration import at_end, at_start
 
 T = TypeVar("T")
 UNREADABLE = (OSError, ValueError, KeyError, TypeError, MuError)
@@ -68,14 +69,15 @@ def _load(name: str) -> int:
     return int(_previews.load(name, name, "IMAGE", force_reload=True).icon_id)
 
 
-def register() -> None:
+@at_start
+def _open() -> None:
     """Create the collection of previews."""
     global _previews
     _previews = bpy.utils.previews.new()
 
 
-def unregister() -> None:
-    """Remove it."""
+@at_end
+def _close() -> None:
     global _previews
     bpy.utils.previews.remove(_previews)
     _previews = None

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import inspect
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from functools import partial, wraps
@@ -12,7 +13,7 @@ import attrs
 import bpy
 
 from ...errors import MuError
-from . import displays
+from . import displays, registration
 from .wording import in_panel
 
 _scripts = 0
@@ -87,6 +88,11 @@ def _again(uuid: str, name: str, values: dict) -> None:
             )
 
 
+def unless(there: Callable[[Any], Any], why: str) -> Callable[[Any], str]:
+    """The `trouble` of an operator that needs something of its root: why it cannot run where that lacks."""
+    return lambda root: "" if there(root) else why
+
+
 class RootPoll:
     """The poll of an operator on an active root: greyed out, with the reason, where it cannot run."""
 
@@ -94,6 +100,8 @@ class RootPoll:
     """Return the root to work on in a context, or None."""
     no_root: str
     """Words where there is none."""
+    root_name = "root"
+    """What functions that are operators call it."""
     linked_too = False
     """True if it also runs on what is linked from a library."""
 
@@ -113,7 +121,12 @@ class RootPoll:
 
 
 class RootOperator(RootPoll):
-    """An operator that acts at once on the active root; errors of the core become messages."""
+    """An operator that acts at once on the active root; errors of the core become messages.
+
+    One undo step, unless its `bl_options` say otherwise: for what is in files, processes or preferences.
+    """
+
+    bl_options = {"REGISTER", "UNDO"}
 
     def act(self, context, root):
         """Do the operator's work on `root`; returns None when it is done, {"CANCELLED"} for no undo step."""
@@ -122,6 +135,55 @@ class RootOperator(RootPoll):
     @reports_errors
     def execute(self, context):
         return self.act(context, self.find_root(context)) or {"FINISHED"}
+
+
+def operator(
+    base: type,
+    label: str,
+    *,
+    undo: bool = True,
+    trouble: Callable[[Any], str] | None = None,
+    **properties: Any,
+) -> Callable[[Any], Any]:
+    """A function as the operator of its name, its docstring in the tooltip; the function stays as it is.
+
+    base: a `RootOperator`; trouble: of a root, further reason why it cannot run; properties: of the operator,
+    by name. The function's parameters name what it is given: `context`, `root` (or `base.root_name`),
+    properties, or the `operator` itself. It returns what `RootOperator.act` does.
+    """
+
+    def made(function: Any) -> Any:
+        names = list(inspect.signature(function).parameters)
+
+        def act(self, context, root):
+            known = {"operator": self, "context": context, base.root_name: root}
+            return function(**{name: known[name] if name in known else getattr(self, name) for name in names})
+
+        members = {
+            "__doc__": function.__doc__,
+            "__module__": function.__module__,
+            "__annotations__": properties,
+            "bl_label": label,
+            "bl_options": {"REGISTER", "UNDO"} if undo else {"REGISTER"},
+            "act": act,
+        }
+        if trouble is not None:
+            members["trouble"] = lambda root: base.trouble(root) or trouble(root)
+        registration.made(type(f"MU_OT_{function.__name__}", (base, bpy.types.Operator), members))
+        return function
+
+    return made
+
+
+class FreeOperator:
+    """An operator that needs no root."""
+
+    bl_options = {"REGISTER", "UNDO"}
+    root_name = ""
+
+    @reports_errors
+    def execute(self, context):
+        return self.act(context, None) or {"FINISHED"}
 
 
 def open_file(context, path: Path) -> None:

@@ -73,9 +73,16 @@ def large_button(layout, operator: str, icon: str, root=None, **settings) -> Non
     row.operator(operator, icon=icon, **settings)
 
 
-def fold(layout, name: str, title: str, wrong: bool):
+def fold(layout, name: str, title: str, wrong: bool = False, icon: str = "NONE", closed: bool = True):
     """Draw a fold, with a red head if something in it is wrong; return its layout, None if closed."""
-    header, body = layout.panel(name, default_closed=True)
+    header, body = layout.panel(name, default_closed=closed)
     header.alert = wrong
-    header.label(text=title, icon="ERROR" if wrong else "NONE")
+    header.label(text=title, icon="ERROR" if wrong else icon)
     return body
+
+
+def plain_row(layout, align: bool = True):
+    """A row whose fields have no labels beside them."""
+    row = layout.row(align=align)
+    row.use_property_split = False
+    return row

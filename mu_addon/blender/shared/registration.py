@@ -1,57 +1,240 @@
-"""Registration: property groups, application handlers, and connections to signals."""
+"""What a module hangs into Blender: declared where it stands, removed with the extension.
+
+Blender's classes in a module are registered by themselves, and those of its `CLASSES`, which code makes; a
+class without a `bl_idname` is called as it is, an operator MU_OT_add "mu.add". Decorators say the rest:
+`property_of`, `handler`, `connected`, `menu`, `button`, `overlay`, `timer`, `at_start`, `at_end`.
+"""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
-from typing import Any
+from collections.abc import Callable, Iterable, Iterator
+from typing import Any, NamedTuple
 
 import bpy
+from bpy.app.handlers import persistent
 from bpy.props import PointerProperty
 
 from .updates import Signal
 
-Functions = tuple[Callable[[], None], Callable[[], None]]
-Handlers = Mapping[str, Callable[..., Any]]
-"""Application handlers, by the names of Blender's lists in `bpy.app.handlers`."""
-Connections = Sequence[tuple[Signal, Callable[[Any], Any]]]
+RESTORED = ("undo_post", "redo_post", "load_post")
+"""Events after which the scene is another one."""
+_PROPERTIES, _CLASSES, _CALLS = range(3)
 
 
-def add_handlers(handlers: Handlers, connections: Connections = ()) -> None:
-    """Append each handler to its list in Blender, and connect each function to its signal."""
-    for name, handler in handlers.items():
-        getattr(bpy.app.handlers, name).append(handler)
-    for signal, function in connections:
-        signal.connect(function)
+class Hook(NamedTuple):
+    """Something in Blender, and how it is taken out; those of a lower rank are put in first."""
+
+    rank: int
+    add: Callable[[], Any]
+    remove: Callable[[], Any]
 
 
-def remove_handlers(handlers: Handlers, connections: Connections = ()) -> None:
-    """Undo `add_handlers`; loading a file drops handlers that are not persistent."""
-    for signal, function in connections:
-        signal.disconnect(function)
-    for name, handler in handlers.items():
-        listed = getattr(bpy.app.handlers, name)
-        if handler in listed:
-            listed.remove(handler)
+_declared: dict[str, dict[str, Hook]] = {}
+"""By module and name: its declarations."""
+_made: dict[str, list[Any]] = {}
+"""By module: classes that are made of its functions."""
+_there: list[Hook] = []
 
 
-def property_group_factory(
-    owner: Any, name: str, classes: Sequence[type], calls: Handlers | None = None
-) -> Functions:
-    """Functions `register` and `unregister` of a property group, the last of `classes`.
+def register(modules: Iterable[Any]) -> None:
+    """Put everything that modules declare into Blender, once; on failure nothing is left behind."""
+    if _there:
+        return
+    try:
+        for hook in sorted((h for module in modules for h in _hooks(module)), key=lambda hook: hook.rank):
+            hook.add()
+            _there.append(hook)
+    except Exception:
+        unregister()
+        raise
 
-    It becomes the property `name` of `owner`, such as bpy.types.Object; values stay in the file when the
-    extension is removed and are found when it is installed again. calls: application handlers.
+
+def unregister() -> None:
+    """Take all of it out, the last first."""
+    while _there:
+        _there.pop().remove()
+
+
+def classes_of(module: Any) -> Iterator[Any]:
+    """Blender's classes of a module: those that code makes, then those that stand in it, in order."""
+    by_code = (*getattr(module, "CLASSES", ()), *_made.get(module.__name__, ()))
+    stand = (v for v in vars(module).values() if isinstance(v, type) and v.__module__ == module.__name__)
+    for cls in (*by_code, *stand):
+        # Blender has tools registered in a way of their own.
+        if issubclass(cls, bpy.types.bpy_struct) and not issubclass(cls, bpy.types.WorkSpaceTool):
+            yield cls
+
+
+def _hooks(module: Any) -> Iterator[Hook]:
+    yield from map(_class, classes_of(module))
+    yield from _declared.get(module.__name__, {}).values()
+
+
+def _class(cls: Any) -> Hook:
+    if "bl_idname" not in vars(cls):
+        name = cls.__name__
+        cls.bl_idname = f"mu.{name.removeprefix('MU_OT_')}" if issubclass(cls, bpy.types.Operator) else name
+    rank = _PROPERTIES if issubclass(cls, bpy.types.PropertyGroup) else _CLASSES
+    return Hook(rank, lambda: bpy.utils.register_class(cls), lambda: bpy.utils.unregister_class(cls))
+
+
+def made(cls: Any) -> None:
+    """Have a class registered with its module, in which it does not stand by its name."""
+    _made.setdefault(cls.__module__, []).append(cls)
+
+
+def _declare(module: str, name: str, add: Callable[[], Any], remove: Callable[[], Any], rank: int = _CALLS):
+    _declared.setdefault(module, {})[name] = Hook(rank, add, remove)
+
+
+def attach(module: str, owner: Any, name: str, made: Callable[[], Any]) -> None:
+    """Give a type of Blender's a property; made: makes it, at registration."""
+    _declare(module, name, lambda: setattr(owner, name, made()), lambda: delattr(owner, name), _PROPERTIES)
+
+
+def property_of(owner: Any, name: str) -> Callable[[type], type]:
+    """A property group that is the property `name` of a type such as bpy.types.Object.
+
+    Values stay in the file when the extension is removed, and are found when it is installed again.
     """
-    add_classes, remove_classes = bpy.utils.register_classes_factory(classes)
 
-    def register() -> None:
-        add_classes()
-        setattr(owner, name, PointerProperty(type=classes[-1]))
-        add_handlers(calls or {})
+    def mark(cls: type) -> type:
+        attach(cls.__module__, owner, name, lambda: PointerProperty(type=cls))
+        return cls
 
-    def unregister() -> None:
-        remove_handlers(calls or {})
-        delattr(owner, name)
-        remove_classes()
+    return mark
 
-    return register, unregister
+
+def handler(*events: str) -> Callable[[Any], Any]:
+    """An application handler of events, lists in `bpy.app.handlers`; loading a file does not drop it."""
+
+    def mark(function: Any) -> Any:
+        persistent(function)
+        for event in events:
+            listed = getattr(bpy.app.handlers, event)
+            _declare(
+                function.__module__,
+                f"{function.__name__} {event}",
+                lambda listed=listed: listed.append(function),
+                lambda listed=listed: function in listed and listed.remove(function),
+            )
+        return function
+
+    return mark
+
+
+def connected(*signals: Signal) -> Callable[[Any], Any]:
+    """A function that signals call."""
+
+    def mark(function: Any) -> Any:
+        for number, signal in enumerate(signals):
+            _declare(
+                function.__module__,
+                f"{function.__name__} signal {number}",
+                lambda signal=signal: signal.connect(function),
+                lambda signal=signal: signal.disconnect(function),
+            )
+        return function
+
+    return mark
+
+
+def menu(name: str, first: bool = False) -> Callable[[Any], Any]:
+    """A function that adds to what a menu, a header or a panel draws, at its end or first."""
+
+    def mark(function: Any) -> Any:
+        def add() -> None:
+            of = getattr(bpy.types, name)
+            (of.prepend if first else of.append)(function)
+
+        def remove() -> None:
+            getattr(bpy.types, name).remove(function)
+
+        _declare(function.__module__, f"{function.__qualname__} {name}", add, remove)
+        return function
+
+    return mark
+
+
+def button(*places: str, icon: str = "NONE") -> Callable[[Any], Any]:
+    """An operator, a class or a function, with a button at the end of panels and menus of these names."""
+
+    def mark(made: Any) -> Any:
+        name = f"mu.{made.__name__.removeprefix('MU_OT_')}"
+
+        def draw(self: Any, context: Any) -> None:
+            self.layout.operator(name, icon=icon)
+
+        draw.__module__, draw.__qualname__ = made.__module__, made.__name__
+        for place in places:
+            menu(place)(draw)
+        return made
+
+    return mark
+
+
+def overlay(function: Any) -> Any:
+    """A function that draws over every 3D viewport; not in background."""
+    handles: list[Any] = []
+
+    def add() -> None:
+        if not bpy.app.background:
+            handles.append(bpy.types.SpaceView3D.draw_handler_add(function, (), "WINDOW", "POST_PIXEL"))
+
+    def remove() -> None:
+        while handles:
+            bpy.types.SpaceView3D.draw_handler_remove(handles.pop(), "WINDOW")
+
+    _declare(function.__module__, function.__name__, add, remove)
+    return function
+
+
+class Timer:
+    """A function that Blender calls later, and again after the seconds that it returns; see `timer`."""
+
+    def __init__(self, function: Callable[[], float | None], lasts: bool) -> None:
+        self.function, self._lasts = function, lasts
+
+    def __call__(self) -> float | None:
+        return self.function()
+
+    def soon(self, seconds: float = 0.0) -> None:
+        """Have it called after so many seconds, if it does not wait already."""
+        if not bpy.app.timers.is_registered(self.function):
+            bpy.app.timers.register(self.function, first_interval=seconds, persistent=self._lasts)
+
+    def cancel(self) -> None:
+        """Have it called no more."""
+        if bpy.app.timers.is_registered(self.function):
+            bpy.app.timers.unregister(self.function)
+
+
+def timer(lasts: bool = False, after_s: float | None = None) -> Callable[[Any], Timer]:
+    """A function that Blender calls later: `soon`, and after so many seconds from registration if given.
+
+    lasts: loading a file does not end it.
+    """
+
+    def mark(function: Any) -> Timer:
+        made = Timer(function, lasts)
+        start = _nothing if after_s is None else lambda: made.soon(after_s)
+        _declare(function.__module__, function.__name__, start, made.cancel)
+        return made
+
+    return mark
+
+
+def _nothing() -> None:
+    pass
+
+
+def at_start(function: Any) -> Any:
+    """A function that is called when the extension is registered."""
+    _declare(function.__module__, function.__name__, function, _nothing)
+    return function
+
+
+def at_end(function: Any) -> Any:
+    """A function that is called when it is unregistered."""
+    _declare(function.__module__, function.__name__, _nothing, function)
+    return function

@@ -30,6 +30,12 @@ def corners(objects: Iterable[Any]) -> Any:
     return np.array([obj.matrix_world @ Vector(c) for obj in evaluated for c in obj.bound_box])
 
 
+def in_window() -> Any:
+    """Context of the first window, for what a timer does; without a window, as in background, of none."""
+    windows = bpy.context.window_manager.windows
+    return bpy.context.temp_override(window=windows[0]) if windows else bpy.context.temp_override()
+
+
 def frame(objects: Iterable[Any], only: Any | None = None) -> None:
     """Frame objects in every 3D view or in one, from its present side; also in background."""
     points = corners(objects)
@@ -90,6 +96,22 @@ def scale(factor: float) -> None:
         space.clip_start, space.clip_end = space.clip_start * factor, space.clip_end * factor
 
 
+def object_mode(context: Any) -> None:
+    """Leave the mode of editing or painting that the active object is in."""
+    if context.mode != "OBJECT":
+        bpy.ops.object.mode_set(mode="OBJECT")
+
+
+def select(context: Any, objects: Iterable[Any], active: Any | None = None) -> None:
+    """Select objects, no other ones, and make one of them the active object if it is given."""
+    for other in context.selected_objects:
+        other.select_set(False)
+    for obj in objects:
+        obj.select_set(True)
+    if active is not None:
+        context.view_layer.objects.active = active
+
+
 def frame_selected(context: Any) -> None:
     """Frame the selection in the 3D view: a scene may be metres wide, and a unit is 75 mm tall."""
     if bpy.app.background:
@@ -124,19 +146,11 @@ def redraw() -> None:
         area.tag_redraw()
 
 
-def redraw_panels() -> None:
-    """Redraw the sidebar of every 3D view, and not the scene."""
+def redraw_regions(*kinds: str) -> None:
+    """Redraw regions of every 3D view by their types: the scene is "WINDOW", the sidebar "UI"."""
     for area in areas():
         for region in area.regions:
-            if region.type == "UI":
-                region.tag_redraw()
-
-
-def redraw_views(panels: bool) -> None:
-    """Redraw every 3D view without its tool bars, with its sidebar only if `panels`."""
-    for area in areas():
-        for region in area.regions:
-            if region.type == "WINDOW" or (panels and region.type == "UI"):
+            if region.type in kinds:
                 region.tag_redraw()
 
 
@@ -150,10 +164,7 @@ def redraw_status() -> None:
         if window.screen.show_statusbar and not len(window.modal_operators):
             with bpy.context.temp_override(window=window):
                 window.workspace.status_text_set(None)
-    for area in areas():
-        for region in area.regions:
-            if region.type == "HEADER":
-                region.tag_redraw()
+    redraw_regions("HEADER")
 
 
 def extend_status_bar(draw: Callable[[Any, Any], None]) -> None:
@@ -173,22 +184,3 @@ def reduce_status_bar(draw: Callable[[Any, Any], None]) -> None:
     bar = bpy.types.STATUSBAR_HT_header
     bar.draw = bar._draw_orig
     bar.remove(draw)
-
-
-class Overlay:
-    """A function that draws over every 3D viewport while it is registered; not in background."""
-
-    def __init__(self, draw: Callable[[], None]) -> None:
-        self._draw = draw
-        self._handle: Any = None
-
-    def register(self) -> None:
-        """Start drawing."""
-        if not bpy.app.background:
-            self._handle = bpy.types.SpaceView3D.draw_handler_add(self._draw, (), "WINDOW", "POST_PIXEL")
-
-    def unregister(self) -> None:
-        """Stop drawing."""
-        if self._handle is not None:
-            bpy.types.SpaceView3D.draw_handler_remove(self._handle, "WINDOW")
-            self._handle = None

@@ -7,13 +7,13 @@ import bpy
 from ...design.steps import STEPS
 from ..scene import handles
 from ..shared import displays
+from ..shared.registration import menu
 from ..unit import presets
 
 
 class MU_MT_presets(bpy.types.Menu):
     """Presets of the extension, then your own"""
 
-    bl_idname = "MU_MT_presets"
     bl_label = "Presets"
 
     def draw(self, context):
@@ -33,7 +33,6 @@ class MU_MT_presets(bpy.types.Menu):
 class MU_MT_presets_remove(bpy.types.Menu):
     """Remove one of your own presets"""
 
-    bl_idname = "MU_MT_presets_remove"
     bl_label = "Remove Preset"
 
     def draw(self, context):
@@ -42,6 +41,7 @@ class MU_MT_presets_remove(bpy.types.Menu):
                 self.layout.operator("mu.preset_remove", text=name.removeprefix(presets.USER)).name = name
 
 
+@menu("VIEW3D_MT_mesh_add")
 def _add(self, context):
     self.layout.operator("mu.add", icon="OUTLINER_OB_LATTICE")
     self.layout.operator("mu.gripper_add", icon="MOD_MIRROR")
@@ -88,7 +88,6 @@ _SUBMENUS = [_submenu(title) for title in SUBJECTS]
 class MU_MT_object(bpy.types.Menu):
     """Actions on a whole unit or gripper"""
 
-    bl_idname = "MU_MT_object"
     bl_label = "Monolithic Unit"
 
     def draw(self, context):
@@ -102,19 +101,21 @@ class MU_MT_object(bpy.types.Menu):
         layout.operator("mu.simulate", icon="PLAY")
         layout.operator_menu_enum("mu.field_show", "field", text="Show on the Unit", icon="SHADING_RENDERED")
         layout.separator()
-        for menu in _SUBMENUS:
-            layout.menu(menu.bl_idname)
+        for submenu in _SUBMENUS:
+            layout.menu(submenu.bl_idname)
         layout.separator()
         layout.operator("mu.select", icon="RESTRICT_SELECT_OFF")
         layout.operator("mu.rebuild", icon="FILE_REFRESH")
         layout.operator("mu.delete", icon="TRASH")
 
 
+@menu("VIEW3D_MT_object")
 def _object(self, context):
     # The menu search of Blender finds what is in menus.
     self.layout.menu("MU_MT_object", icon="OUTLINER_OB_LATTICE")
 
 
+@menu("VIEW3D_MT_object_context_menu", first=True)
 def _on_unit(self, context):
     if displays.root_above(context.object) is not None:
         _object(self, context)
@@ -124,7 +125,6 @@ def _on_unit(self, context):
 class MU_MT_more(bpy.types.Menu):
     """Sample scenes, gripper, node groups for your own curves, and the asset browser"""
 
-    bl_idname = "MU_MT_more"
     bl_label = "More"
 
     def draw(self, context):
@@ -138,23 +138,4 @@ class MU_MT_more(bpy.types.Menu):
         layout.operator("mu.assets_remove")
 
 
-CLASSES = (MU_MT_presets, MU_MT_presets_remove, *_SUBMENUS, MU_MT_object, MU_MT_more)
-
-
-_register_classes, _unregister_classes = bpy.utils.register_classes_factory(CLASSES)
-
-
-def register() -> None:
-    """Register menus, and the entries in Add > Mesh and Object."""
-    _register_classes()
-    bpy.types.VIEW3D_MT_mesh_add.append(_add)
-    bpy.types.VIEW3D_MT_object.append(_object)
-    bpy.types.VIEW3D_MT_object_context_menu.prepend(_on_unit)
-
-
-def unregister() -> None:
-    """Unregister them."""
-    bpy.types.VIEW3D_MT_object_context_menu.remove(_on_unit)
-    bpy.types.VIEW3D_MT_object.remove(_object)
-    bpy.types.VIEW3D_MT_mesh_add.remove(_add)
-    _unregister_classes()
+CLASSES = (*_SUBMENUS,)

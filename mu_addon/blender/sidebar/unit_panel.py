@@ -16,7 +16,8 @@ from ..printing import state as printing
 from ..results import motion as motion_parts
 from ..shared import scene_units
 from ..shared.operators import linked
-from ..shared.panels import CHARACTERS, NEXT_STEP, TabPanel, alert, wrapped
+from ..shared.panels import CHARACTERS, NEXT_STEP, TabPanel, alert, fold, wrapped
+from ..shared.registration import connected
 from ..shared.wording import path_symbol
 from ..simulate import study_folder as studies
 from ..simulate.job import SIMULATION
@@ -36,7 +37,6 @@ GRADED = "Factors on the struts' diameters; they multiply, and 1 leaves struts a
 class MU_PT_unit(TabPanel, bpy.types.Panel):
     """The active unit"""
 
-    bl_idname = "MU_PT_unit"
     bl_label = "Monolithic Unit"
 
     @classmethod
@@ -176,6 +176,7 @@ def _next_step(root) -> tuple[str, str, str, dict[str, str]]:
     return "mu.print_open", "Open the Files", "FILE_FOLDER", {"what": "export"}
 
 
+@connected(NEXT_STEP)
 def _offered(root) -> str:
     """Operator that the top offers as the next step, or ""."""
     found = broken(root) if root.mu_unit.trouble else None
@@ -186,7 +187,6 @@ def _offered(root) -> str:
 class MU_PT_design(UnitPanel, bpy.types.Panel):
     """Chambers: number, profile, wall, caps and inlet"""
 
-    bl_idname = "MU_PT_design"
     bl_label = "Design"
     bl_options = set()
     place = ("design",)
@@ -199,7 +199,6 @@ class MU_PT_design(UnitPanel, bpy.types.Panel):
 class MU_PT_lattice(UnitPanel, bpy.types.Panel):
     """Cells of the lattice and its struts"""
 
-    bl_idname = "MU_PT_lattice"
     bl_label = "Lattice"
     place = "lattice", "grading"
 
@@ -216,8 +215,7 @@ class MU_PT_lattice(UnitPanel, bpy.types.Panel):
 
 def _own_body(layout, root) -> None:
     """Buttons to check, use and remove a mesh as the unit's envelope."""
-    header, body = layout.panel("MU_own_body", default_closed=True)
-    header.label(text="Body of Your Own")
+    body = fold(layout, "MU_own_body", "Body of Your Own")
     if body:
         row = body.row(align=True)
         row.operator("mu.body_check", icon="VIEWZOOM")
@@ -240,20 +238,3 @@ def _painting(layout, root) -> None:
     row.operator("mu.paint_struts_apply", icon="CHECKMARK")
     row.operator("mu.paint_struts", text="Go On", icon="WPAINT_HLT")
     row.operator("mu.paint_struts_discard", icon="X")
-
-
-CLASSES = (MU_PT_unit, MU_PT_design, MU_PT_lattice)
-
-_register_classes, _unregister_classes = bpy.utils.register_classes_factory(CLASSES)
-
-
-def register() -> None:
-    """Register the panels, and tell the others what the top offers."""
-    _register_classes()
-    NEXT_STEP.connect(_offered)
-
-
-def unregister() -> None:
-    """Unregister them."""
-    NEXT_STEP.disconnect(_offered)
-    _unregister_classes()

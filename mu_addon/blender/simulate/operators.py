@@ -3,7 +3,6 @@
 # Blender reads the annotations themselves: no `from __future__ import annotations` here.
 
 import attrs
-import bpy
 
 from ...usecases.simulate_and_place import unit_runs
 from ...usecases.simulate_and_place.settings import QUICK
@@ -11,6 +10,7 @@ from ..jobs import start_child
 from ..jobs.operators import FILES, job_operators
 from ..shared import viewports
 from ..shared.blender_property import blender_property
+from ..shared.operators import operator
 from ..unit.base_classes import ValidUnitOperator
 from . import study_folder as studies
 from .job import SIMULATION, job_of, plan_of
@@ -24,45 +24,30 @@ def _file_of(root, what):
     return studies.results_folder(root) / FILES[what]
 
 
-class MU_OT_simulate(ValidUnitOperator, bpy.types.Operator):
-    """Simulate the unit in a child process; Blender stays usable, and finished stages are not repeated"""
-
-    bl_idname = "mu.simulate"
-    bl_label = "Simulate"
-    bl_options = {"REGISTER"}
-
-    # Not remembered: the next press of the main button is no quick one.
-    quick: blender_property(QUICK, name="Quick Ranking", options={"SKIP_SAVE"})
-
-    @classmethod
-    def trouble(cls, root):
-        running = SIMULATION.is_running(root)
-        return super().trouble(root) or ("This unit is being simulated" if running else start_child.lacking())
-
-    def act(self, context, root):
-        study = root.mu_unit.study
-        job = job_of(root, self.quick)
-        # Imported late, with the solver's packages.
-        from ...studies.use_case import write_study
-
-        folder, job = unit_runs.place_of(studies.assign_folder(root), job)
-        options = ["--device", study.device]
-        kind = attrs.evolve(SIMULATION, plan_of=lambda root: plan_of(root, self.quick))
-        kind.start(root, folder, lambda folder: write_study(job, folder), options)
-        viewports.redraw()
+def _simulate_trouble(root):
+    running = SIMULATION.is_running(root)
+    return "This unit is being simulated" if running else start_child.lacking()
 
 
-CLASSES = (
-    MU_OT_simulate,
-    *job_operators(
-        SIMULATION,
-        "",
-        "simulation",
-        kept="finished stages are kept, and the next run continues from there",
-        first="simulate first",
-        path_of=_file_of,
-    ),
+@operator(
+    ValidUnitOperator,
+    "Simulate",
+    undo=False,
+    trouble=_simulate_trouble,
+    quick=blender_property(QUICK, name="Quick Ranking", options={"SKIP_SAVE"}),
 )
+def simulate(root, quick):
+    """Simulate the unit in a child process; Blender stays usable, and finished stages are not repeated"""
+    study = root.mu_unit.study
+    job = job_of(root, quick)
+    # Imported late, with the solver's packages.
+    from ...studies.use_case import write_study
+
+    folder, job = unit_runs.place_of(studies.assign_folder(root), job)
+    options = ["--device", study.device]
+    kind = attrs.evolve(SIMULATION, plan_of=lambda root: plan_of(root, quick))
+    kind.start(root, folder, lambda folder: write_study(job, folder), options)
+    viewports.redraw()
 
 
-register, unregister = bpy.utils.register_classes_factory(CLASSES)
+CLASSES = job_operators(SIMULATION, "simulate first", path_of=_file_of)

@@ -7,7 +7,7 @@ import bpy
 from ...design.printing.finding import counted
 from ..jobs import start_child
 from ..jobs.panel import job_state, start_button, timed
-from ..shared.panels import wrapped
+from ..shared.panels import fold, wrapped
 from ..unit import resins
 from ..unit.base_classes import DONE, OUTDATED, UnitPanel, folded_place
 from . import effects
@@ -18,7 +18,6 @@ from .job import SIMULATION, announced
 class MU_PT_simulate(UnitPanel, bpy.types.Panel):
     """Motion and ranking of the sensor paths, computed in a child process"""
 
-    bl_idname = "MU_PT_simulate"
     bl_label = "Simulate"
     place = ("simulate",)
 
@@ -58,14 +57,13 @@ class MU_PT_simulate(UnitPanel, bpy.types.Panel):
         if child is None and not announced(root)[1]:
             wrapped(layout, "Perhaps: no such run has been timed on this machine yet", "TIME")
         job_state(layout, child, "see Results")
-        others = [key for key in start_child.running() if key != SIMULATION.key(root)]
+        others = [job for job in start_child.running() if job.key != SIMULATION.key(root)]
         if others:
             wrapped(layout, counted(len(others), "other job runs", "other jobs run"), "INFO")
         text = resins.name_of(root)
         layout.operator_menu_enum("mu.resin", "name", text=text, icon="MATERIAL")
         folded_place(layout, root, "simulate", "Constants of the Resin")
-        header, body = layout.panel("MU_computing", default_closed=True)
-        header.label(text="Device and Folder")
+        body = fold(layout, "MU_computing", "Device and Folder")
         if body:
             body.prop(study, "device")
             body.prop(study, "folder")
@@ -89,9 +87,3 @@ def _effects(layout, root) -> None:
         wrapped(box, line)
     if effects.has_gravity(root):
         box.prop(root.mu_unit.study, "orientation_deg")
-
-
-CLASSES = (MU_PT_simulate,)
-
-
-register, unregister = bpy.utils.register_classes_factory(CLASSES)

@@ -20,9 +20,8 @@ from ...run.progress_estimate import Plan
 from ...run.study import REPORT_S, Study
 from ...run.summary import SUMMARY
 from ...studies import STUDIES, study
-from ..jobs.panel import job_state, timed
+from ..jobs.panel import timed
 from ..jobs.start_child import SOLVER, JobKind, lacking
-from ..shared import viewports
 from ..shared.blender_property import exact
 from ..shared.file_cache import FileCache
 from ..shared.wording import in_panel
@@ -51,7 +50,8 @@ class StudyJob:
     run; given: its inputs by name, raises MuError; fields: property by input, of the group `group`; hindered:
     why it cannot start, beside what its inputs say; result: file that is shown, made by `made_of` of its
     JSON; beside: inputs that leave the result valid. stale: the reason, where `given` takes long or differs
-    (None: by the inputs); claim: called before the start.
+    (None: by the inputs); claim: called before the start; texts: of its inputs' files, for the job to check,
+    where its inputs take long to make.
     """
 
     study: str
@@ -68,6 +68,7 @@ class StudyJob:
     stale: Callable[[Any, Path], str | None] = lambda root, folder: None
     quick: Callable[[Any], bool] = lambda root: True
     claim: Callable[[Any], Any] = study_folder.assign_folder
+    texts: Callable[[Any], dict[str, str]] | None = None
     _read: FileCache[tuple[Any, str]] = attrs.field(factory=FileCache, init=False)
     _before: FileCache[Study] = attrs.field(factory=FileCache, init=False)
 
@@ -80,7 +81,7 @@ class StudyJob:
 
     def trouble(self, root: Any) -> str:
         """Reason why it cannot be started now, or ""; quick: False where the inputs take long to make."""
-        why = "" if not self.kind.is_running(root) else f"A {self.kind.title} is running"
+        why = "" if not self.kind.is_running(root) else f"The {self.kind.title} is running"
         why = why or lacking(self.needed) or self.hindered(root)
         if why or not self.quick(root):
             return why
@@ -94,11 +95,11 @@ class StudyJob:
         """Write its inputs and start it; raises MuError."""
         self.claim(root)
         self.kind.start(root, self.folder_of(root), lambda folder: self.write(root, folder))
-        viewports.redraw()
 
     def write(self, root: Any, folder: Path) -> None:
         """Write its inputs into a folder; raises MuError."""
-        write_run(folder, study(self.study).layout(), self.inputs(root).texts())
+        texts = self.inputs(root).texts() if self.texts is None else self.texts(root)
+        write_run(folder, study(self.study).layout(), texts)
 
     def label(self, root: Any, name: str) -> str:
         """Words on its button: with the seconds that it took here, or is declared to take."""
@@ -130,10 +131,6 @@ class StudyJob:
         child = self.kind.child(root)
         return child if child is not None and child.folder.parent == self.folder_of(root) else None
 
-    def draw_state(self, layout: Any, root: Any, prefix: str, where: str = "see below") -> None:
-        """Draw its progress or its end; prefix: of the operators of its kind."""
-        job_state(layout, self.child(root), where, prefix)
-
     def found(self, root: Any) -> Found | None:
         """Its result, or None; read again only when a file changes."""
         folder = self.folder_of(root)
@@ -164,21 +161,6 @@ class StudyJob:
             return ""
         own = "other parameters" if changed[0] in OF_UNIT else f"another {changed[0].replace('_', ' ')}"
         return f"made with {own}"
-
-
-class StudyOperator:
-    """Mix-in of an operator that starts a study; greyed out, with the reason, where it cannot."""
-
-    job: StudyJob
-
-    @classmethod
-    def trouble(cls, root: Any) -> str:
-        """Reason why it cannot start, or ""."""
-        return super().trouble(root) or cls.job.trouble(root)  # type: ignore[misc]
-
-    def act(self, context: Any, root: Any) -> None:
-        """Start it."""
-        self.job.start(root)
 
 
 def timed_study(folder: Path) -> tuple[str, dict[str, float]]:

@@ -15,6 +15,7 @@ from ...usecases.simulate_and_place import unit_runs
 from ..jobs import start_child
 from ..shared.compat import user_folder
 from ..shared.file_cache import UNREADABLE, FileCache
+from ..shared.registration import at_end, connected
 
 if TYPE_CHECKING:
     from ...usecases.simulate_and_place.expected import Size
@@ -81,6 +82,7 @@ def note(detail: str, seconds: dict[str, float]) -> None:
     write_text(_file(), json.dumps({**_every(), detail: {**before, **real}}, indent=1) + "\n")
 
 
+@connected(start_child.JOB_ENDED)
 def _ended(key: str) -> None:
     child = start_child.child_of(key)
     read = READERS.get(key.rpartition(":")[2])
@@ -94,12 +96,6 @@ def _ended(key: str) -> None:
         return
 
 
-def register() -> None:
-    """Connect to the end of jobs."""
-    start_child.JOB_ENDED.connect(_ended)
-
-
-def unregister() -> None:
-    """Disconnect."""
-    start_child.JOB_ENDED.disconnect(_ended)
+@at_end
+def _forget() -> None:
     _kept.clear()

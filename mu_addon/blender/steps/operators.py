@@ -10,8 +10,10 @@ from ...design.parameters import SECTIONS
 from ...design.quantity import describe
 from ...design.repairs import tied
 from ...design.steps import STEPS, Step, downstream
+from ...errors import InputError
 from ..shared import updates
 from ..shared.blender_property import blender_property, exact, millimetres, step_of
+from ..shared.operators import operator
 from ..shared.wording import label, sentence, tooltip
 from ..unit import object as unit_object
 from ..unit import stack
@@ -45,7 +47,6 @@ def _annotations(step: Step) -> dict:
 class _OfStep(UnitOperator):
     """Sets the given parameters of a step, and runs the step again."""
 
-    bl_options = {"REGISTER", "UNDO"}
     step: Step
 
     def invoke(self, context, event):
@@ -82,12 +83,10 @@ class _OfStep(UnitOperator):
             props.step = list(STEPS).index(self.step.name)
         stack.STACK.again(self.step.name, stack.given(root, unit))
         if not unit_object.rebuild(root):
-            self.report({"ERROR"}, props.trouble)
-            return {"CANCELLED"}
+            raise InputError(props.trouble)
         self._take(props)
         made = [name for name in STEPS if stack.STACK.counts[name] > before[name]]
         self.report({"INFO"}, f"Updated: {', '.join(made)}; all other steps unchanged")
-        return {"FINISHED"}
 
     def draw(self, context):
         layout = self.layout
@@ -122,46 +121,33 @@ def _generated(step: Step) -> type:
     return type(f"MU_OT_{step.name}", (_OfStep, bpy.types.Operator), members)
 
 
-class MU_OT_mute(UnitOperator, bpy.types.Operator):
-    """Mute or unmute a step of the design"""
-
-    bl_idname = "mu.mute"
-    bl_label = "Mute Step"
-    bl_options = {"REGISTER", "UNDO"}
-
-    step: EnumProperty(
+@operator(
+    UnitOperator,
+    "Mute Step",
+    step=EnumProperty(
         name="Step",
         description="Step of the design",
         items=[(step.name, step.name.capitalize(), step.muting) for step in STEPS.values() if step.muting],
-    )
-    muted: BoolProperty(name="Mute", description="Leave the step out", default=True)
-
-    def act(self, context, root):
-        with updates.paused():
-            stack.fill(root.mu_unit)
-            root.mu_unit.stack[self.step].muted = self.muted
-        unit_object.rebuild(root)
-
-
-class MU_OT_again(UnitOperator, bpy.types.Operator):
-    """Run one step again, and of the later steps those whose input changes"""
-
-    bl_idname = "mu.again"
-    bl_label = "Run Step Again"
-    bl_options = {"REGISTER", "UNDO"}
-
-    step: StringProperty(name="Step", description="Name of a step of the design", default="profile")
-
-    def act(self, context, root):
-        stack.STACK.again(self.step, stack.given(root, to_unit(root.mu_unit)))
-        unit_object.rebuild(root)
-
-
-CLASSES = (
-    *(_generated(step) for step in STEPS.values() if step.name not in _OF_THEIR_OWN),
-    MU_OT_mute,
-    MU_OT_again,
+    ),
+    muted=BoolProperty(name="Mute", description="Leave the step out", default=True),
 )
+def mute(root, step, muted):
+    """Mute or unmute a step of the design"""
+    with updates.paused():
+        stack.fill(root.mu_unit)
+        root.mu_unit.stack[step].muted = muted
+    unit_object.rebuild(root)
 
 
-register, unregister = bpy.utils.register_classes_factory(CLASSES)
+@operator(
+    UnitOperator,
+    "Run Step Again",
+    step=StringProperty(name="Step", description="Name of a step of the design", default="profile"),
+)
+def again(root, step):
+    """Run one step again, and of the later steps those whose input changes"""
+    stack.STACK.again(step, stack.given(root, to_unit(root.mu_unit)))
+    unit_object.rebuild(root)
+
+
+CLASSES = (*(_generated(step) for step in STEPS.values() if step.name not in _OF_THEIR_OWN),)

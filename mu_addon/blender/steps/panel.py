@@ -16,8 +16,6 @@ from ..unit.fields import description
 class MU_UL_steps(bpy.types.UIList):
     """Steps of the design, in order"""
 
-    bl_idname = "MU_UL_steps"
-
     def draw_item(self, context, layout, data, item, icon, active_data, active_property, index):
         row = layout.row(align=True)
         drawable = row.row()
@@ -35,7 +33,6 @@ class MU_UL_steps(bpy.types.UIList):
 class MU_PT_stack(UnitPanel, bpy.types.Panel):
     """The design step by step: each step can be shown, muted, changed and run again"""
 
-    bl_idname = "MU_PT_stack"
     bl_label = "Steps"
 
     def show(self, layout, context, root):
@@ -66,9 +63,3 @@ class MU_PT_stack(UnitPanel, bpy.types.Panel):
                 f"Cannot be printed while muted: {', '.join(s for s in STEPS if s in lacking)}",
                 "INFO",
             )
-
-
-CLASSES = (MU_UL_steps, MU_PT_stack)
-
-
-register, unregister = bpy.utils.register_classes_factory(CLASSES)

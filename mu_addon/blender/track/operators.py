@@ -7,6 +7,7 @@ from pathlib import Path
 import bpy
 from bpy.props import StringProperty
 
+from ...errors import InputError
 from ...run.context import RunContext
 from ...run.execution import Execution
 from ...run.progress import Progress
@@ -27,7 +28,6 @@ def clip_of(context):
 class MU_OT_track(bpy.types.Operator):
     """Track the selected markers, or all, from this frame to the end of the clip"""
 
-    bl_idname = "mu.track"
     bl_label = "Track Markers"
     bl_options = {"REGISTER", "UNDO"}
 
@@ -62,7 +62,6 @@ class MU_OT_track(bpy.types.Operator):
 class MU_OT_track_write(bpy.types.Operator):
     """Write angle, positions and pressure over time into a folder of measured data"""
 
-    bl_idname = "mu.track_write"
     bl_label = "Write Measured Data"
     bl_options = {"REGISTER", "UNDO"}
 
@@ -84,8 +83,7 @@ class MU_OT_track_write(bpy.types.Operator):
     def execute(self, context):
         clip = bpy.data.movieclips.get(self.clip) if self.clip else clip_of(context)
         if clip is None:
-            self.report({"ERROR"}, f"There is no clip {self.clip!r}" if self.clip else NO_CLIP)
-            return {"CANCELLED"}
+            raise InputError(f"There is no clip {self.clip!r}" if self.clip else NO_CLIP)
         study = Track(
             clip=Path(clip.name),
             bench=bench.bench_of(clip),
@@ -104,9 +102,3 @@ class MU_OT_track_write(bpy.types.Operator):
         if root is not None and not root.mu_evidence.folder:
             root.mu_evidence.folder = clip.mu_bench.folder
         return {"FINISHED"}
-
-
-CLASSES = (MU_OT_track, MU_OT_track_write)
-
-
-register, unregister = bpy.utils.register_classes_factory(CLASSES)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import bpy
 
-from ..shared.panels import large_button, wrapped
+from ..shared.panels import fold, large_button, wrapped
 from . import properties as bench
 from .operators import NO_CLIP, clip_of
 
@@ -12,7 +12,6 @@ from .operators import NO_CLIP, clip_of
 class MU_PT_track(bpy.types.Panel):
     """From a video of the bench to an experiment for the Evidence panel"""
 
-    bl_idname = "MU_PT_track"
     bl_label = "Monolithic Unit on the Bench"
     bl_space_type = "CLIP_EDITOR"
     bl_region_type = "UI"
@@ -30,8 +29,7 @@ class MU_PT_track(bpy.types.Panel):
         _markers(layout, clip, settings)
         _scale(layout, clip, settings)
         _time(layout, clip, settings)
-        header, body = layout.panel("MU_experiment", default_closed=True)
-        header.label(text="Experiment")
+        body = fold(layout, "MU_experiment", "Experiment")
         if body:
             for name in ("title", "role", "unit_scale", "orientation_deg", "specimen"):
                 body.prop(settings, name)
@@ -74,9 +72,3 @@ def _time(layout, clip, settings):
     if settings.fps == 0.0 and clip.fps > 0.0:
         column.label(text=f"{clip.fps:g} in the clip", icon="INFO")
     column.prop(settings, "starts_s")
-
-
-CLASSES = (MU_PT_track,)
-
-
-register, unregister = bpy.utils.register_classes_factory(CLASSES)

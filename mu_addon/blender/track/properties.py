@@ -17,9 +17,8 @@ from ...errors import InputError
 from ...measured.bench import Bench, MarkerSettings
 from ...measured.kinds import ROLES
 from ...measured.video import View
-from ..shared.blender_property import exact
-from ..shared.registration import property_group_factory
-from ..unit.properties import BESIDE_BLEND_FILE
+from ..shared.blender_property import exact, path_property
+from ..shared.registration import property_of
 
 
 def _track(name: str, description: str):
@@ -35,6 +34,7 @@ def _place(name: str):
     )
 
 
+@property_of(bpy.types.MovieClip, "mu_bench")
 class MU_PG_bench(bpy.types.PropertyGroup):
     """Setup of a video: the object, the view, and the markers."""
 
@@ -101,17 +101,11 @@ class MU_PG_bench(bpy.types.PropertyGroup):
         description="Time of the pressure's record at the clip's first frame",
         precision=3,
     )
-    pressure: StringProperty(
-        name="Pressure",
-        description="CSV file of time_s,pressure_kPa: a recording, or the protocol that was played",
-        subtype="FILE_PATH",
-        options=BESIDE_BLEND_FILE,
+    pressure: path_property(
+        "Pressure", "CSV file of time_s,pressure_kPa: a recording, or the protocol that was played"
     )
-    folder: StringProperty(
-        name="Measured Data",
-        description="Folder that gets the experiment; other clips may be in it already",
-        subtype="DIR_PATH",
-        options=BESIDE_BLEND_FILE,
+    folder: path_property(
+        "Measured Data", "Folder that gets the experiment; other clips may be in it already", folder=True
     )
     title: StringProperty(name="Experiment", description="Name of the experiment. Empty: the clip's")
     role: EnumProperty(
@@ -189,6 +183,3 @@ def bench_of(clip: Any) -> Bench:
 
 def _pair(values: Any) -> tuple[float, float]:
     return exact(values[0]), exact(values[1])
-
-
-register, unregister = property_group_factory(bpy.types.MovieClip, "mu_bench", (MU_PG_bench,))

@@ -102,7 +102,7 @@ def own_mesh(root: Any, mesh: Any | None, others: list[Any]) -> Any:
 
 def beside(root: Any, name: str) -> Any | None:
     """Display of that name: a candidate path, the free path, or flaws; None if it is not shown."""
-    return next((child for child in root.children if child.get(displays.PART) == name), None)
+    return displays.part(root, displays.PART, name)
 
 
 def put_beside(root: Any, name: str, skeleton: Skeleton, colour: str, group: str, title: str = "") -> Any:

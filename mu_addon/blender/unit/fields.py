@@ -6,6 +6,7 @@ from collections.abc import Callable
 from functools import cache
 from typing import Any
 
+import bpy
 from bpy.props import EnumProperty
 
 from ...design.anchors import windows
@@ -79,6 +80,20 @@ def generated_fields(section: type, changed) -> dict[str, Any]:
         if d.unit == "mm" and not d.fixed:
             annotations |= true_length(d.name, label(d), tooltip(d), step_of(d.high))
     return annotations
+
+
+def generated_group(section: type, changed, prefix: str = "MU_PG_") -> type:
+    """A property group of a section's parameters."""
+    members = {"__annotations__": generated_fields(section, changed), "__doc__": section.__doc__}
+    return type(f"{prefix}{section.section}", (bpy.types.PropertyGroup,), members)
+
+
+def set_sections(props, sections, core) -> None:
+    """Set the groups of these sections to the values of the core's."""
+    for section in sections:
+        group, values = getattr(props, section.section), getattr(core, section.section)
+        for d in describe(section):
+            setattr(group, d.name, getattr(values, d.name))
 
 
 def description(section: str, name: str) -> Description:

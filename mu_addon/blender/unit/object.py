@@ -19,7 +19,7 @@ from ...design.parameters import Unit
 from ...errors import InputError, MuError
 from ..preview import materials, nodes, skeletons
 from ..preview.nodes import unit as unit_group
-from ..shared import displays, scene_units, updates
+from ..shared import displays, scene_units, updates, viewports
 from ..shared.compat import set_modifier_input
 from . import broken, drawing, envelope, stack
 from .properties import from_unit, shape_hash, to_unit
@@ -69,6 +69,13 @@ def _of_gripper(obj: Any | None) -> bool:
     return obj is not None
 
 
+def first_that(context: Any, shows: Any) -> Any | None:
+    """The active unit, or else another one, of which `shows` is true; None without any."""
+    active = active_root(context)
+    every = [active, *(root for root in roots() if root != active)]
+    return next((root for root in every if root is not None and shows(root)), None)
+
+
 def by_uuid(name: str) -> Any | None:
     """The unit of that UUID, or None where it was deleted."""
     return next((o for o in roots() if o.mu_unit.uuid == name), None)
@@ -88,6 +95,7 @@ def create(context: Any, unit: Unit) -> Any:
 
 def new_root(context: Any, title: str) -> Any:
     """A root object, to hold parameters and a mesh in mm, in its true size at the scene's 3D cursor."""
+    viewports.object_mode(context)
     root = bpy.data.objects.new(title, bpy.data.meshes.new(title))
     context.collection.objects.link(root)
     root.location = context.scene.cursor.location
@@ -99,10 +107,7 @@ def new_root(context: Any, title: str) -> Any:
 
 def make_active(context: Any, obj: Any) -> None:
     """Select an object, alone, and make it the active one."""
-    for other in context.selected_objects:
-        other.select_set(False)
-    obj.select_set(True)
-    context.view_layer.objects.active = obj
+    viewports.select(context, [obj], obj)
 
 
 def delete(root: Any) -> None:

@@ -12,8 +12,8 @@ from ...design.repairs import tied
 from ...design.settings import PRESET
 from ...errors import InputError
 from ..shared import landing, scene_units, updates, viewports
-from ..shared.blender_property import exact
-from ..shared.operators import reports_errors
+from ..shared.blender_property import exact, listed
+from ..shared.operators import FreeOperator, operator, reports_errors
 from ..shared.wording import label, tooltip
 from . import object as unit_object
 from . import presets
@@ -37,27 +37,21 @@ def _use_millimetres(context) -> None:
     scene_units.CHANGED.send(context.scene)
 
 
-_items: list[tuple[str, str, str]] = []
-
-
-def _preset_items(self, context):
-    # Blender does not keep these strings alive; this list does.
-    _items[:] = [
+def _presets() -> list[tuple[str, str, str]]:
+    return [
         (n, n.removeprefix(presets.USER), "Your own" if n.startswith(presets.USER) else "")
         for n in presets.names()
     ]
-    return _items
 
 
 class MU_OT_add(bpy.types.Operator):
     """Add a Monolithic Unit: bladder actuator, lattice and sensor path in one body"""
 
-    bl_idname = "mu.add"
     bl_label = "Monolithic Unit"
     bl_options = {"REGISTER", "UNDO"}
 
     preset: EnumProperty(
-        name="Preset", description="Unit to begin with", items=_preset_items, options={"SKIP_SAVE"}
+        name="Preset", description="Unit to begin with", items=listed(_presets), options={"SKIP_SAVE"}
     )
     scale: FloatProperty(
         name="Scale",
@@ -88,8 +82,6 @@ class MU_OT_add(bpy.types.Operator):
             core = attrs.evolve(core, scale=max(exact(self.scale), _SCALE.low))
         if self.millimetres:
             _use_millimetres(context)
-        if context.mode != "OBJECT":
-            bpy.ops.object.mode_set(mode="OBJECT")
         root = unit_object.create(context, core)
         landing.land(context, root)
         if self.frame:
@@ -97,28 +89,19 @@ class MU_OT_add(bpy.types.Operator):
         return {"FINISHED"}
 
 
-class MU_OT_rebuild(UnitOperator, bpy.types.Operator):
+@operator(UnitOperator, "Rebuild Unit")
+def rebuild(root):
     """Build the unit's mesh again from its parameters, with everything that was edited or deleted by hand"""
-
-    bl_idname = "mu.rebuild"
-    bl_label = "Rebuild Unit"
-    bl_options = {"REGISTER", "UNDO"}
-
-    def act(self, context, root):
-        if root.mode == "EDIT":
-            bpy.ops.object.mode_set(mode="OBJECT")
-        if not unit_object.rebuild(root):
-            self.report({"ERROR"}, root.mu_unit.trouble)
-            return {"CANCELLED"}
-        return {"FINISHED"}
+    if root.mode == "EDIT":
+        bpy.ops.object.mode_set(mode="OBJECT")
+    if not unit_object.rebuild(root):
+        raise InputError(root.mu_unit.trouble)
 
 
 class MU_OT_fit(UnitOperator, bpy.types.Operator):
     """Set a parameter to the nearest value that keeps every design rule"""
 
-    bl_idname = "mu.fit"
     bl_label = "Use the Value That Fits"
-    bl_options = {"REGISTER", "UNDO"}
 
     section: StringProperty(name="Section", description="Section of the parameter: chambers, lattice ...")
     name: StringProperty(name="Parameter", description="Name of the parameter")
@@ -148,9 +131,7 @@ class MU_OT_fit(UnitOperator, bpy.types.Operator):
 class MU_OT_fit_all(UnitOperator, bpy.types.Operator):
     """Set every parameter that breaks a rule to the nearest round value that keeps all of them"""
 
-    bl_idname = "mu.fit_all"
     bl_label = "Fix All"
-    bl_options = {"REGISTER", "UNDO"}
 
     @classmethod
     def description(cls, context, properties):
@@ -185,43 +166,24 @@ def _repairs_in_words(root, found) -> list[str]:
     return words
 
 
-class MU_OT_delete(UnitOperator, bpy.types.Operator):
+@operator(UnitOperator, "Delete Unit")
+def delete(root):
     """Delete the unit with all that shows its results; its study folder stays"""
-
-    bl_idname = "mu.delete"
-    bl_label = "Delete Unit"
-    bl_options = {"REGISTER", "UNDO"}
-
-    def act(self, context, root):
-        unit_object.delete(root)
+    unit_object.delete(root)
 
 
-class MU_OT_millimetres(bpy.types.Operator):
+@operator(FreeOperator, "Use Millimetres")
+def millimetres(context):
     """Make one Blender unit a millimetre; units, grippers, obstacles and the view keep their true sizes"""
-
-    bl_idname = "mu.millimetres"
-    bl_label = "Use Millimetres"
-    bl_options = {"REGISTER", "UNDO"}
-
-    def execute(self, context):
-        _use_millimetres(context)
-        return {"FINISHED"}
+    _use_millimetres(context)
 
 
 class MU_OT_select(UnitOperator, bpy.types.Operator):
     """Select the unit itself, alone, if a display of it is the active object"""
 
-    bl_idname = "mu.select"
     bl_label = "Select Unit"
-    bl_options = {"REGISTER", "UNDO"}
 
     linked_too = True
 
     def act(self, context, root):
         unit_object.make_active(context, root)
-
-
-CLASSES = (MU_OT_add, MU_OT_rebuild, MU_OT_fit, MU_OT_fit_all, MU_OT_delete, MU_OT_millimetres, MU_OT_select)
-
-
-register, unregister = bpy.utils.register_classes_factory(CLASSES)

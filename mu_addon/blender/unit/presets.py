@@ -13,7 +13,7 @@ from ...design.parameters import Unit, load_preset, preset_names, read_unit, wri
 from ...errors import InputError, OutputError
 from ..shared import updates
 from ..shared.compat import user_folder
-from ..shared.operators import reports_errors
+from ..shared.operators import operator, reports_errors
 from . import object as unit_object
 from .base_classes import UnitOperator
 from .properties import from_unit, to_unit
@@ -67,28 +67,24 @@ def _folder() -> Path:
     return user_folder("presets")
 
 
-class MU_OT_preset_load(UnitOperator, bpy.types.Operator):
+@operator(
+    UnitOperator,
+    "Load Preset",
+    name=StringProperty(name="Preset", description="Name of a preset; your own begin with `user:`"),
+)
+def preset_load(root, name):
     """Set every parameter of the unit to those of a preset"""
-
-    bl_idname = "mu.preset_load"
-    bl_label = "Load Preset"
-    bl_options = {"REGISTER", "UNDO"}
-
-    name: StringProperty(name="Preset", description="Name of a preset; your own begin with `user:`")
-
-    def act(self, context, root):
-        core = load(self.name)
-        if not is_named_after_one(root.name):
-            core = attrs.evolve(core, name=root.mu_unit.title)  # the user's own name stays
-        with updates.paused():
-            from_unit(root.mu_unit, core)
-        unit_object.rebuild(root)
+    core = load(name)
+    if not is_named_after_one(root.name):
+        core = attrs.evolve(core, name=root.mu_unit.title)  # the user's own name stays
+    with updates.paused():
+        from_unit(root.mu_unit, core)
+    unit_object.rebuild(root)
 
 
 class MU_OT_preset_save(UnitOperator, bpy.types.Operator):
     """Save the unit's parameters as your own preset, a TOML file that headless/run.py also reads"""
 
-    bl_idname = "mu.preset_save"
     bl_label = "Save Preset"
     bl_options = {"REGISTER"}
 
@@ -106,7 +102,6 @@ class MU_OT_preset_save(UnitOperator, bpy.types.Operator):
 class MU_OT_preset_remove(bpy.types.Operator):
     """Remove a preset of your own"""
 
-    bl_idname = "mu.preset_remove"
     bl_label = "Remove Preset"
     bl_options = {"REGISTER"}
 
@@ -119,9 +114,3 @@ class MU_OT_preset_remove(bpy.types.Operator):
     def execute(self, context):
         remove(self.name)
         return {"FINISHED"}
-
-
-CLASSES = (MU_OT_preset_load, MU_OT_preset_save, MU_OT_preset_remove)
-
-
-register, unregister = bpy.utils.register_classes_factory(CLASSES)

@@ -9,10 +9,9 @@ from __future__ import annotations
 import time
 
 import bpy
-from bpy.app.handlers import persistent
 
 from ..shared import updates, viewports
-from ..shared.registration import add_handlers, remove_handlers
+from ..shared.registration import RESTORED, at_end, connected, handler, timer
 from . import object as unit_object
 from .properties import PARAMETERS_CHANGED, VIEW_CHANGED
 
@@ -22,6 +21,7 @@ _rebuilt_at = 0.0
 _pending: set[str] = set()
 
 
+@connected(PARAMETERS_CHANGED)
 def schedule(root) -> None:
     """Schedule a rebuild of a unit's preview; rebuild at once in background, where timers never fire."""
     if updates.are_paused() or not root.mu_unit.uuid:
@@ -30,12 +30,11 @@ def schedule(root) -> None:
         unit_object.rebuild(root)
         return
     _pending.add(root.mu_unit.uuid)
-    if not bpy.app.timers.is_registered(_rebuild_pending):
-        # The first change is followed at once, later ones during a drag at intervals.
-        wait = max(0.0, INTERVAL_S - (time.monotonic() - _rebuilt_at))
-        bpy.app.timers.register(_rebuild_pending, first_interval=wait)
+    # The first change is followed at once, later ones during a drag at intervals.
+    _rebuild_pending.soon(max(0.0, INTERVAL_S - (time.monotonic() - _rebuilt_at)))
 
 
+@timer()
 def _rebuild_pending():
     global _rebuilt_at
     pending, names = set(_pending), []
@@ -50,25 +49,22 @@ def _rebuild_pending():
     _rebuilt_at = time.monotonic()
 
 
+@connected(VIEW_CHANGED)
 def _show(root) -> None:
     """Show the parts that the user wants to see, preview or solid."""
     if not updates.are_paused() and root.mu_unit.uuid:
         unit_object.show(root)
 
 
-@persistent
-def _after_undo_or_load(*_):
-    catch_up()
-
-
-def catch_up() -> None:
+@handler(*RESTORED)
+def catch_up(*_) -> None:
     """Rebuild every preview that is behind its parameters or its study."""
     for root in unit_object.roots():
         if unit_object.behind(root):
             schedule(root)
 
 
-@persistent
+@handler("frame_change_post")
 def _played(*_):
     """Rebuild after keyframes and drivers, which set parameters without a property's update."""
     for root in unit_object.roots():
@@ -77,21 +73,6 @@ def _played(*_):
             schedule(root)
 
 
-_HANDLERS = {
-    **dict.fromkeys(("undo_post", "redo_post", "load_post"), _after_undo_or_load),
-    "frame_change_post": _played,
-}
-_CONNECTIONS = ((PARAMETERS_CHANGED, schedule), (VIEW_CHANGED, _show))
-
-
-def register():
-    """Register handlers for undo, redo and load, and the signals that start a rebuild."""
-    add_handlers(_HANDLERS, _CONNECTIONS)
-
-
-def unregister():
-    """Unregister handlers, signals and a waiting rebuild."""
-    remove_handlers(_HANDLERS, _CONNECTIONS)
-    if bpy.app.timers.is_registered(_rebuild_pending):
-        bpy.app.timers.unregister(_rebuild_pending)
+@at_end
+def _forget() -> None:
     _pending.clear()

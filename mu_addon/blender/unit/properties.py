@@ -24,14 +24,13 @@ from ...design.quantity import Description, describe
 from ...fem.device import DEVICE
 from ...meshing.settings import REFINE, SELF_CONTACT
 from ...usecases.simulate_and_place.settings import ALL_PATHS, ORIENTATION, PATHS, PROTOCOL, SELF_FRICTION
-from ..shared.blender_property import blender_property, exact
-from ..shared.registration import property_group_factory
+from ..shared.blender_property import BESIDE_BLEND_FILE, blender_property, exact, path_property
+from ..shared.registration import property_of
 from ..shared.updates import Signal
-from .fields import generated_fields, tied
+from .fields import generated_group, set_sections, tied
 
 PARAMETERS_CHANGED, VIEW_CHANGED = Signal(), Signal()
 """Sent with the root whose parameters changed, and with the root whose displayed parts changed."""
-BESIDE_BLEND_FILE = {"PATH_SUPPORTS_BLEND_RELATIVE"}
 
 
 def _changed(group, context):
@@ -45,15 +44,7 @@ def _candidates_changed(unit, context):
     PARAMETERS_CHANGED.send(unit.id_data)
 
 
-def _generated(section: type):
-    annotations = generated_fields(section, _changed)
-    name = f"MU_PG_{section.section}"
-    return type(
-        name, (bpy.types.PropertyGroup,), {"__annotations__": annotations, "__doc__": section.__doc__}
-    )
-
-
-GROUPS = {section.section: _generated(section) for section in SECTIONS}
+GROUPS = {section.section: generated_group(section, _changed) for section in SECTIONS}
 _HEAD = {d.name: d for d in describe(Unit)}
 
 
@@ -101,11 +92,10 @@ class MU_PG_study(bpy.types.PropertyGroup):
     run_design: StringProperty(options={"HIDDEN"})
     # The run that the shown one is compared with.
     against: StringProperty(options={"HIDDEN"})
-    folder: StringProperty(
-        name="Study Folder",
-        description="Folder of this unit's runs. Empty: beside the .blend file, or the user's folder",
-        subtype="DIR_PATH",
-        options=BESIDE_BLEND_FILE,
+    folder: path_property(
+        "Study Folder",
+        "Folder of this unit's runs. Empty: beside the .blend file, or the user's folder",
+        folder=True,
     )
 
 
@@ -136,6 +126,7 @@ def title_property(noun: str):
     return StringProperty(name="Name", description=text, get=read, set=write)
 
 
+@property_of(bpy.types.Object, "mu_unit")
 class MU_PG_unit(bpy.types.PropertyGroup):
     """One Monolithic Unit, kept on its root object."""
 
@@ -188,7 +179,7 @@ class MU_PG_unit(bpy.types.PropertyGroup):
     }
 
 
-CLASSES = (*GROUPS.values(), MU_PG_study, MU_PG_step, MU_PG_unit)
+CLASSES = (*GROUPS.values(),)
 
 
 def section_of(props, section: str) -> dict:
@@ -218,14 +209,8 @@ def shape_hash(unit: Unit) -> str:
 def from_unit(props, unit: Unit) -> None:
     """Set Blender's properties to a unit; each still calls its update, see `updates.paused`."""
     props.title, props.scale = unit.name, unit.scale
-    for section in SECTIONS:
-        group, values = getattr(props, section.section), getattr(unit, section.section)
-        for d in describe(section):
-            setattr(group, d.name, getattr(values, d.name))
+    set_sections(props, SECTIONS, unit)
 
 
 def _value(d: Description, value):
     return exact(value) if d.type is float else value
-
-
-register, unregister = property_group_factory(bpy.types.Object, "mu_unit", CLASSES)

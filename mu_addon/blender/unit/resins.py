@@ -6,13 +6,13 @@ import json
 from typing import Any
 
 import attrs
-import bpy
 import numpy as np
 from bpy.props import EnumProperty
 
 from ...design.assets import asset_names
 from ...design.parameters import SECTIONS, Unit
 from ..shared import updates
+from ..shared.operators import operator
 from . import object as unit_object
 from .base_classes import UnitOperator
 
@@ -50,26 +50,20 @@ def name_of(root: Any) -> str:
     return str(kept.get("name", NONE))
 
 
-class MU_OT_resin(UnitOperator, bpy.types.Operator):
-    """Give the unit the constants of this resin: its wall's modulus, law and break strain"""
-
-    bl_idname = "mu.resin"
-    bl_label = "Resin"
-    bl_options = {"REGISTER", "UNDO"}
-
-    name: EnumProperty(
+@operator(
+    UnitOperator,
+    "Resin",
+    name=EnumProperty(
         name="Resin",
         description="Resin of the unit's wall; its file says where each constant is from",
         items=[(name, name.replace("-", " ").title(), "") for name in asset_names("materials")],
-    )
+    ),
+)
+def resin(root, name):
+    """Give the unit the constants of this resin: its wall's modulus, law and break strain"""
+    # Imported late, with the solver's packages.
+    from ...materials import load_material
 
-    def act(self, context, root):
-        # Imported late, with the solver's packages.
-        from ...materials import load_material
-
-        resin = load_material(self.name)
-        take(root, resin.name, parameters(resin))
-        unit_object.rebuild(root)
-
-
-register, unregister = bpy.utils.register_classes_factory((MU_OT_resin,))
+    resin = load_material(name)
+    take(root, resin.name, parameters(resin))
+    unit_object.rebuild(root)

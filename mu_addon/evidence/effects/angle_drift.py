@@ -1,6 +1,23 @@
 """Angle drift."""
 
-from .declaration import BENCH, Declaration
+import attrs
+import numpy as np
+
+from ..camera import View
+from ..drift import drift, drift_laws
+from .declaration import BENCH, CYCLED, Data, Declaration, Setting, Values
+
+# Largest rotation of a stable camera during a record.
+TURN_deg = 20.0
+
+
+def _most(data: Data) -> float:
+    return TURN_deg
+
+
+def _turned(view: View, v: Values, at: Setting) -> View:
+    return attrs.evolve(view, turned=view.turned + np.radians(drift(at.time_s, v)))
+
 
 EFFECT = Declaration(
     mechanism="the camera rotates slowly about its optical axis",
@@ -9,4 +26,5 @@ EFFECT = Declaration(
     of=BENCH,
     instrument=True,
     level=True,
+    laws=drift_laws(CYCLED, "deg", _most, {"view": _turned}),
 )

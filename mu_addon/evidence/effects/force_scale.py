@@ -1,6 +1,7 @@
 """Force scale."""
 
-from .declaration import BENCH, Declaration
+from ..load_cell import if_timed
+from .declaration import BENCH, CELL, Declaration, Law, factor
 
 EFFECT = Declaration(
     mechanism="the force is scaled: load cell, section as typed, clamping or specimen",
@@ -10,4 +11,12 @@ EFFECT = Declaration(
         "section, and clamp the specimen again"
     ),
     of=BENCH,
+    laws=(
+        Law(
+            CELL,
+            (factor("gain", 0.05, "calibrations of load cells, sections, units"),),
+            {"cell_gain": lambda force, v, at: force * (1.0 + v["gain"])},
+            offered=if_timed,
+        ),
+    ),
 )

@@ -1,6 +1,24 @@
 """Lens distortion."""
 
-from .declaration import BENCH, Declaration
+import attrs
+
+from ..camera import View
+from .declaration import BENCH, CYCLED, Declaration, Law, Parameter, Setting, Values
+
+AT_TIP = Parameter(
+    "at_tip",
+    "",
+    -0.05,
+    0.05,
+    0.0,
+    (0.005,),
+    "radial, where the tip is at rest: lenses of cameras 0.1 to 5 %; above 0 pincushion",
+)
+
+
+def _distorted(view: View, v: Values, at: Setting) -> View:
+    return attrs.evolve(view, lens=v["at_tip"])
+
 
 EFFECT = Declaration(
     mechanism="the camera's lens distorts its picture",
@@ -9,4 +27,5 @@ EFFECT = Declaration(
     of=BENCH,
     instrument=True,
     camera=True,
+    laws=(Law(CYCLED, (AT_TIP,), {"view": _distorted}),),
 )

@@ -1,6 +1,6 @@
 """Pressure gain."""
 
-from .declaration import BENCH, Declaration
+from .declaration import BENCH, OF_UNITS, Declaration, Law, factor
 
 EFFECT = Declaration(
     mechanism="the pressure gauge has a gain error",
@@ -12,4 +12,14 @@ EFFECT = Declaration(
     },
     of=BENCH,
     instrument=True,
+    laws=(
+        Law(
+            (*OF_UNITS, "pressure_hold"),
+            (factor("gain", 0.05, "gauge's sheet, units"),),
+            {
+                "gain": lambda p, v, at: p / (1.0 + v["gain"]),
+                "read_gain": lambda p, v, at: p * (1.0 + v["gain"]),
+            },
+        ),
+    ),
 )

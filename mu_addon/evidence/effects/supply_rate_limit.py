@@ -2,37 +2,29 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
-from typing import Any
-
+import attrs
 import numpy as np
 
-from ...measured import Experiment
-from ..parameter import Parameter
-from .declaration import BENCH, Declaration
+from .declaration import BENCH, DRIVEN, Array, Data, Declaration, Law, Parameter, Setting, Values
 from .supply_limit import driven
-
-Array = np.ndarray[Any, Any]
 
 # Share of a record's changes that are slower than its fastest; of those the time a kPa, times the starts.
 FASTEST, LONGER, LONGEST = 0.95, (2.0,), 50.0
 
 
-def _laws(kind: str, experiments: Sequence[Experiment]) -> tuple[tuple[Parameter, ...], ...]:
-    rates = [np.abs(np.gradient(e["pressure_kPa"], e["time_s"])) for e in driven(kind, experiments)]
+def _slow(law: Law, data: Data) -> tuple[Law, ...]:
+    rates = [np.abs(np.gradient(e["pressure_kPa"], e["time_s"])) for e in driven(data)]
     fastest = max((float(np.nanquantile(r, FASTEST)) for r in rates), default=0.0)
     if not fastest:
         return ()
     starts = tuple(s / fastest for s in LONGER)
-    slow = Parameter("slowness_s_kPa", "s/kPa", 0.0, LONGEST / fastest, 0.0, starts, "of its valve")
-    return ((slow,),)
+    size = attrs.evolve(law.parameters[0], high=LONGEST / fastest, starts=starts)
+    return (attrs.evolve(law, parameters=(size,)),)
 
 
-def _given(experiment: Experiment, p: Array, values: Mapping[str, float], largest_kPa: float) -> Array:
-    if not (slow := values["slowness_s_kPa"]):
-        return p
+def _given(p: Array, v: Values, at: Setting) -> Array:
     x, found = float(p[0]), [float(p[0])]
-    for to, most in zip(p[1:].tolist(), (np.diff(experiment["time_s"]) / slow).tolist(), strict=True):
+    for to, most in zip(p[1:].tolist(), (np.diff(at.time_s) / v["slowness_s_kPa"]).tolist(), strict=True):
         x += min(max(to - x, -most), most)
         found.append(x)
     return np.array(found)
@@ -44,6 +36,12 @@ EFFECT = Declaration(
     remedy="ask for slower changes, or log a gauge at the unit",
     of=BENCH,
     instrument=True,
-    laws=_laws,
-    pressure=_given,
+    laws=(
+        Law(
+            DRIVEN,
+            (Parameter("slowness_s_kPa", "s/kPa", 0.0, 1.0, 0.0, (), "of its valve"),),
+            {"supply": _given},
+            offered=_slow,
+        ),
+    ),
 )

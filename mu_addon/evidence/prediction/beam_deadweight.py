@@ -9,14 +9,15 @@ import numpy as np
 
 from ...errors import ConvergenceError
 from ...measured import Experiment
-from ..effect import Effect, Parameter, laws
-from .coupon import STRAIN_STIFFENING
-from .specimen import FRAME
+from ..effect import offered
+from ..effects import Acting
+from ..effects.declaration import Data, Setting
+from ..effects.gravity import G as GRAVITY
+from ..parameter import Parameter
 
 Array = np.ndarray[Any, Any]
 
 KIND = "beam_deadweight"
-GRAVITY = 9.80665
 # Shear coefficient of a rectangle, 10 (1 + nu)/(12 + 11 nu) at 1/2: Cowper, J. Appl. Mech. 33 (1966) 335.
 SHEAR = 15.0 / 17.5
 NODES = 24
@@ -35,43 +36,17 @@ MODULUS = Parameter(
 # clamps separates them, as part of the weight's uncertainty.
 TILT = Parameter("tilt_deg", "deg", -10.0, 10.0, 0.0, (), "clamps set by eye or level", spread=1.0)
 
-EFFECTS = (
-    Effect(
-        "gravity",
-        (
-            Parameter(
-                "density_kg_m3",
-                "kg/m3",
-                0.0,
-                4000.0,
-                0.0,
-                (1000.0,),
-                "elastomers 950 to 1300, filled ones 1800",
-                plausible=(0.0, 2000.0),
-            ),
-        ),
-        (KIND,),
-        "the beam bends under its weight",
-    ),
-    Effect("strain_stiffening", STRAIN_STIFFENING.parameters, (KIND,)),
-    Effect(
-        "frame_compliance",
-        (FRAME,),
-        (KIND,),
-        "the clamp turns under the moment at the root, its jaws a thickness apart giving way",
-    ),
-)
-
 
 class BeamSag:
     """Predicts the tip deflection of a cantilever: an elastica of given modulus, without weight.
 
+    What acts on the `beam` are arguments of `cantilever`.
     Shear is added at first order; the solid is incompressible. An experiment needs section_mm (width,
     thickness), length_mm and the column added_mass_g.
     """
 
     nuisances = (MODULUS, TILT)
-    effects = (*EFFECTS, *laws(KIND, ()))
+    effects = offered(Data(kind=KIND))
 
     def channels(self, experiment: Experiment) -> tuple[str, ...]:
         """The predicted column: sag of the tip in mm."""
@@ -84,27 +59,23 @@ class BeamSag:
         """
         assert experiment.section_mm is not None
         assert experiment.length_mm is not None
-        get = values.get
         (width, h), L = experiment.section_mm, experiment.length_mm
-        bending = 1e-3 * get(MODULUS.name, MODULUS.null) * width * h**3 / 12
-        # kg/m3 is 1e-9 kg/mm3.
-        weight = 1e-9 * GRAVITY * get("gravity.density_kg_m3", 0.0) * width * h * L
+        bending = 1e-3 * values.get(MODULUS.name, MODULUS.null) * width * h**3 / 12
+        lengths = {"width_mm": width, "thickness_mm": h, "length_mm": L}
+        acting = Acting(KIND, values, Setting(experiment=experiment, bending=bending, **lengths))
         masses, row = np.unique(experiment["added_mass_g"], return_inverse=True)
         sag = cantilever(
             1e-3 * GRAVITY * masses * L**2 / bending,
-            weight * L**2 / bending,
-            tilt=np.radians(get(TILT.name, 0.0)),
-            give=get("frame_compliance.mm_per_N", 0.0) / h**2 * bending / L,
-            # c2 (I1 - 3)^2 adds 6 c2/c1 e^2 to the modulus, and 3/20 of that at the faces to the moment.
-            stiffening=0.9 * get("strain_stiffening.c2_over_c1", 0.0) * (h / L) ** 2,
+            tilt=np.radians(values.get(TILT.name, 0.0)),
             shear=h**2 / (4 * SHEAR * L**2),
+            **acting.along({}, "beam"),
         )
         return (L * sag[row])[None]
 
 
 def cantilever(
     tip: Array,
-    weight: float,
+    weight: float = 0.0,
     *,
     tilt: float = 0.0,
     give: float = 0.0,

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Mapping, Sequence
 from typing import Any
 
@@ -12,40 +11,21 @@ import numpy as np
 from ...errors import InputError
 from ...measured import Experiment
 from ...measured.pose import down
-from ..effect import Effect, Parameter, laws
-from ..effects import acted
-from .drift import drift, drifts, largest_reading
-from .effective_pressure import DECADES, first_order_lag, in_the_chambers, lag_weights
-from .instruments import amplified, amplifier, before_the_gauge, filtered
-from .unit_pressure import (
-    GAUGE_SHARE,
-    REFERENCE_C,
-    RELAXING,
-    TIMED,
-    TWO_VOLUMES,
-    UnitPressure,
-    UnitResponse,
-    believed,
-)
+from ..effect import Effect, offered
+from ..effects import ON_UNITS, Acting, places
+from ..effects.declaration import Data, Setting
+from ..lags import first_order_lag, lag_weights
+from ..load_cell import ZERO_SHARE
+from ..parameter import Parameter
+from ..unit_body import HELD
+from .unit_pressure import UnitPressure, UnitResponse, believed, driving_kPa
 
 Array = np.ndarray[Any, Any]
 
 KIND = "blocked_force"
 FORCE = "force_N"
-# Of the largest force: drift allowed by a cell's data sheet, and errors of zeroing by hand.
-ZERO_SHARE = 0.01
-ACTING = (
-    "viscoelasticity",
-    "temperature_drift",
-    "pressure_offset",
-    "pressure_gain",
-    "pressure_nonlinearity",
-    "line_lag",
-    "leak",
-    "clock_offset",
-)
-GAP = "seating.tip_gap_mm"
-STAND = Parameter("stand_mm_per_N", "mm/N", 0.0, 1.0, 0.0, (0.05,), "beams of load cells, printed stands")
+# What a load cell shows, in order.
+SHOWN = ("filter", "cell_curve", "cell_gain", "cell_drift")
 # Iterations until the stand's deflection and the force agree: each gains the stand's share of the unit's
 # stiffness.
 ROUNDS = 8
@@ -67,24 +47,14 @@ class BlockedForce:
             raise InputError("no response of the unit is given", KIND, "simulate the unit first")
         self._responses = tuple(responses)
         self._driven = UnitPressure(responses)
-        here = [e for e in experiments if e.kind == KIND]
+        data = Data(kind=KIND, experiments=experiments)
+        here = data.own
         static = [e for e in self._driven.effects if e.name in responses[0].variants]
-        self._sizes = {e.name: e.keys[0] for e in static}
-        self._most = most = largest_reading(FORCE, KIND, here)
-        self._largest_kPa = largest_reading("pressure_kPa", KIND, here)
-        self.effects = (
-            *(
-                Effect(e.name, e.parameters, (KIND,), e.mechanism, refines=e.refines)
-                for e in (*TIMED, RELAXING, TWO_VOLUMES)
-                if e.name in ACTING
-            ),
-            *(Effect(e.name, e.parameters, (KIND,)) for e in static),
-            *drifts("pressure_drift", "kPa", GAUGE_SHARE * self._largest_kPa, KIND, here),
-            *drifts("force_drift", "N", ZERO_SHARE * most, KIND, here),
-            *laws(KIND, here),
-            *amplifier(KIND),
-            *([Effect("frame_compliance", (STAND,), (KIND,))] if "seating" in self._sizes else []),
-        )
+        # How far the stand gives way is known by runs of the tip at other gaps.
+        self._gap = next((e.name for e in static if ON_UNITS[e.name].of == HELD), "")
+        self._most, self._largest_kPa = data.largest(FORCE), data.largest("pressure_kPa")
+        laws = (e for e in offered(data) if self._gap or "stand" not in places(KIND, e.name))
+        self.effects = (*(Effect(e.name, e.parameters, (KIND,)) for e in static), *laws)
         curved = tuple(p for p in self._driven.nuisances if not p.linear)
         asked = [(self._response(e), e) for e in here]
         self.nuisances = (*believed(curved, asked), *(_zero_parameter(e) for e in here))
@@ -98,38 +68,30 @@ class BlockedForce:
 
         Raises InputError where no response is near the experiment's scale, gap and orientation.
         """
-        get, t, p = values.get, experiment["time_s"], experiment["pressure_kPa"]
+        t = experiment["time_s"]
+        setting = Setting(experiment=experiment, time_s=t, largest=self._largest_kPa, fed=1.0)
+        acting = Acting(KIND, values, setting)
         response = self._response(experiment)
-        if delay := get("clock_offset.offset_s", 0.0):
-            p = np.interp(t - delay, t, p)
-        p = p - drift("pressure_drift", t, values)
-        p = before_the_gauge(p, values, self._largest_kPa)
-        p = acted("pressure", experiment, p, values, self._largest_kPa)
-        if experiment.valve != "shut":
-            p = in_the_chambers(t, p, values)
-        kelvin = experiment.temperature_C - REFERENCE_C
-        modulus = get("modulus_factor", 1.0)
-        modulus *= 1.0 + get("temperature_drift.per_K", 0.0) * (kelvin if math.isfinite(kelvin) else 0.0)
-        relaxing = shares(values)
+        p = driving_kPa(acting)
+        modulus = acting.along(values.get("modulus_factor", 1.0), "modulus")
+        relaxing = acting.along((), "elements")
         p = self._driven.discrepant(_weighed(t, p / modulus, relaxing), values)
-        static = self._driven.static(values)
-        if "gravity" in static:
-            static["gravity"] = static["gravity"] / modulus
-        force = self._balanced(response, p, static, get("frame_compliance.stand_mm_per_N", 0.0) * modulus)
-        read = modulus * pressing(t, force, relaxing)
-        read = amplified(filtered(t, read, values), values, self._most) + drift("force_drift", t, values)
-        return (read + get(_zero(experiment), 0.0))[None]
+        static = self._driven.static(values, modulus)
+        force = self._balanced(response, p, static, acting.along(0.0, "stand") * modulus)
+        setting.largest, setting.kPa_per_N = self._most, 1.0
+        read = acting.along(modulus * pressing(t, force, relaxing), *SHOWN)
+        return np.asarray(read + values.get(_zero(experiment), 0.0))[None]
 
     def _balanced(self, response: UnitResponse, p: Array, static: Mapping[str, float], give: float) -> Array:
         """Force (n,) in N of the held tip, negative for tension; give: compliance of the stand in mm/N."""
         force = response.at(p, static)[0]
         if not give:
             return force
-        gap = static.get("seating", 0.0)
+        gap = static.get(self._gap, 0.0)
         for _ in range(ROUNDS):
             # At most a few points of the stand's way are asked for: the response is smooth in it.
             at = np.linspace(0.0, max(float(force.max()) * give, 1e-9), 5)
-            every = np.stack([response.at(p, {**static, "seating": gap + a})[0] for a in at])
+            every = np.stack([response.at(p, {**static, self._gap: gap + a})[0] for a in at])
             way = np.clip(give * force, 0.0, at[-1])
             k = np.clip(np.searchsorted(at, way) - 1, 0, len(at) - 2)
             share = (way - at[k]) / (at[k + 1] - at[k])
@@ -152,18 +114,6 @@ class BlockedForce:
             experiment.name,
             "simulate the unit there, or leave the experiment out",
         )
-
-
-def shares(values: Mapping[str, float]) -> tuple[tuple[float, float], ...]:
-    """Share of the modulus and time in s of each element that relaxes, of either law of viscoelasticity."""
-    get = values.get
-    found = []
-    if share := get("viscoelasticity.share", 0.0):
-        found.append((share, get("viscoelasticity.time_s", 1.0) / (1.0 - share)))
-    if share := get("viscoelasticity.per_decade", 0.0):
-        onset = get("viscoelasticity.onset_s", 1.0)
-        found += [(share, onset * 10.0**k) for k in range(DECADES)]
-    return tuple(found)
 
 
 def _weighed(t: Array, p: Array, relaxing: Sequence[tuple[float, float]]) -> Array:

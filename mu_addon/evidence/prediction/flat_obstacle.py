@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from functools import cached_property
 from typing import Any
 
@@ -10,11 +9,10 @@ import attrs
 import numpy as np
 
 from ...errors import InputError
-from ..effect import Effect, Parameter
 
 Array = np.ndarray[Any, Any]
 
-NAME = "contact"
+CONTACT = "contact"
 # A wall nearer than this share of the free unit's way is not computed.
 NEAREST = 0.9
 
@@ -58,6 +56,11 @@ class ObstacleResponse:
         """Largest distance in mm of the free unit beyond its outline at rest, at the last pressure."""
         return float(self.outward_mm[-1])
 
+    @property
+    def nearest_mm(self) -> float:
+        """Largest computed distance in mm of a wall inside the free unit's farthest position anywhere."""
+        return float(self.reaches_mm[-1]) + self.spare_mm
+
     @cached_property
     def _met(self) -> Any:
         from scipy.interpolate import PchipInterpolator
@@ -97,37 +100,3 @@ class ObstacleResponse:
 
 # The spline over shares is read off a fine even grid, between whose points a straight line is as good.
 _EVEN = np.linspace(0.0, 1.0, 101)
-
-
-def contact_effect(sides: Sequence[tuple[int, ObstacleResponse]], kind: str) -> Effect:
-    """The effect of contact with a wall; its size reach_mm is above 0 on the side +y, below 0 on -y.
-
-    sides: responses with the side of each wall, 1 for +y and -1 for -y. Bounds are the nearest computed
-    walls. kind: of the experiments.
-    """
-    farthest = {s: max((side.farthest_mm for t, side in sides if t == s), default=0.0) for s in (1, -1)}
-    # Walls nearer than the computed ones are not extrapolated.
-    nearest = {
-        s: max((side.reaches_mm[-1] + side.spare_mm for t, side in sides if t == s), default=0.0)
-        for s in (1, -1)
-    }
-    starts = [round(s * share * near, 3) for s, near in nearest.items() for share in (0.3, 0.7) if near]
-    reaches = " or ".join(
-        f"{far:.1f} mm beyond its outline at rest toward {'+' if s > 0 else '-'}y"
-        for s, far in farthest.items()
-        if far
-    )
-    size = Parameter(
-        "reach_mm",
-        "mm",
-        -float(nearest[-1]),
-        float(nearest[1]),
-        0.0,
-        tuple(starts),
-        f"distance of a wall inside the free unit's farthest position, {reaches}; below 0 toward -y",
-    )
-    mechanism = (
-        "the unit touches a flat wall parallel to its axis, reach_mm inside the outline it would "
-        f"reach without the wall: {reaches}"
-    )
-    return Effect(NAME, (size,), (kind,), mechanism)

@@ -12,8 +12,12 @@ import numpy as np
 
 from ...homogenize.offset_response import OffsetResponse
 from ...measured import Experiment
-from ..effect import THICKNESS, Effect, Parameter, laws
-from .specimen import NEW, largest_N, load_cell, machine, recorded, strain_histories
+from ..effect import offered
+from ..effects import Acting
+from ..effects.declaration import Data
+from ..load_cell import largest_N
+from ..parameter import Parameter
+from .specimen import NEW, recorded, specimen_setting, strain_histories
 
 Array = np.ndarray[Any, Any]
 
@@ -21,68 +25,6 @@ KIND = "lattice_compression"
 
 MODULUS = Parameter("lattice_modulus_kPa", "kPa", 0.1, 1e7, 30.0, (), "at 1.0x, as drawn, along z")
 DENSITY = Parameter("lattice_density_g_cm3", "g/cm3", 0.005, 2.0, 0.15, (), "as drawn")
-
-EFFECTS = (
-    Effect(
-        "overcure",
-        (
-            Parameter(
-                "offset_mm",
-                "mm",
-                0.0,
-                0.25,
-                0.0,
-                (0.03, 0.1),
-                "of every surface; printers cure 0.05 to 0.1 mm too far, J. Manuf. Mater. Process. 8(3) 90",
-            ),
-        ),
-        (KIND,),
-    ),
-    Effect(
-        "skin_cure",
-        (
-            Parameter(
-                "excess_mm",
-                "mm",
-                0.0,
-                0.4,
-                0.0,
-                (0.05, 0.2),
-                "depth of the skin times its modulus over the core's, less 1; cure depths are 0.05 to 0.2 mm",
-            ),
-        ),
-        (KIND,),
-    ),
-    Effect(
-        "strain_stiffening",
-        (
-            Parameter(
-                "closing",
-                "",
-                -5.0,
-                2.4,
-                0.0,
-                (-1.0, 1.0),
-                "1 over the strain at which cells have closed; below 0 struts buckle",
-            ),
-        ),
-        (KIND,),
-        "cells close or struts buckle, so the stiffness changes with strain",
-    ),
-    Effect(
-        "strain_stiffening",
-        (
-            Parameter(
-                "at_tenth", "", -20.0, 0.95, 0.0, (-0.1, 0.1), "change of 1 over the stiffness at 10 %"
-            ),
-            Parameter("order", "", 0.3, 6.0, 1.0, (1.0, 2.0), "1 where cells close, 2 where struts buckle"),
-        ),
-        (KIND,),
-        "cells close or struts buckle, so the stiffness changes with strain",
-        refines=True,
-    ),
-    *machine(KIND),
-)
 
 
 class Scaling(Protocol):
@@ -222,14 +164,14 @@ class LatticeStress:
         curve: Callable[[Array], Array] = _linear,
     ) -> None:
         self._histories = strain_histories(experiments, KIND)
-        self._largest_N = largest_N(experiments, KIND)
         self.scalings = scalings
         most = min(
             (self._scaling(e).largest_offset_mm(e.scale) for e in experiments if e.kind == KIND),
             default=math.inf,
         )
-        printed = (_within(e, most) if e.name == "overcure" else e for e in EFFECTS)
-        self.effects = (*printed, *load_cell(experiments, KIND), *laws(KIND, experiments))
+        data = Data(kind=KIND, experiments=experiments, largest_offset_mm=most)
+        self.effects = offered(data)
+        self._largest_N = largest_N(data)
         self._curve = curve
 
     @property
@@ -248,28 +190,17 @@ class LatticeStress:
 
         Raises InputError for a print offset beyond the computed ones and ConvergenceError, see `recorded`.
         """
-        offset = values.get("overcure.offset_mm", 0.0)
-        excess = values.get("skin_cure.excess_mm", 0.0)
-        modulus = values.get(MODULUS.name, MODULUS.null)
         scaling = self._scaling(experiment)
-        # Both sides of a strut.
-        offset += 0.5 * values.get(f"{THICKNESS}.thicker_mm", 0.0)
-        modulus *= scaling.stiffness(experiment.scale, offset, excess)
-        closing = values.get("strain_stiffening.closing", 0.0)
-        at_tenth = values.get("strain_stiffening.at_tenth", 0.0)
-        order = values.get("strain_stiffening.order", 1.0)
+        setting = specimen_setting(experiment, self._histories.get(experiment.name, NEW), self._largest_N)
+        acting = Acting(KIND, values, setting)
+        offset, excess = acting.along((0.0, 0.0), "printed")
+        modulus = values.get(MODULUS.name, MODULUS.null) * scaling.stiffness(experiment.scale, offset, excess)
 
         def law(strain: Array) -> Array:
-            stress = modulus * self._curve(strain)
-            # Slope 1 at first; a strain near 1/closing would be beyond the last gap between struts.
-            if closing:
-                stress = stress / np.maximum(1 - closing * strain, 0.02)
-            if at_tenth:
-                stress = stress / np.maximum(1 - at_tenth * (10.0 * np.abs(strain)) ** order, 0.02)
-            return stress
+            setting.strain = strain
+            return np.asarray(acting.along(modulus * self._curve(strain), "law"))
 
-        past = self._histories.get(experiment.name, NEW)
-        found = [recorded(experiment, law, values, past, self._largest_N)]
+        found = [recorded(acting, law, values)]
         if "mass_g" in self.channels(experiment):
             mass = values.get(DENSITY.name, DENSITY.null) * (_volume_cm3(experiment) or 0.0)
             mass *= scaling.mass(experiment.scale, offset)
@@ -278,15 +209,6 @@ class LatticeStress:
 
     def _scaling(self, experiment: Experiment) -> Scaling:
         return self.scalings.get(experiment.name, SLENDER)
-
-
-def _within(effect: Effect, most: float) -> Effect:
-    """The effect with its size bounded by a value."""
-    size, *others = effect.parameters
-    if size.high <= most:
-        return effect
-    starts = tuple(v for v in size.starts if v < most) or (0.5 * most,)
-    return attrs.evolve(effect, parameters=(attrs.evolve(size, high=most, starts=starts), *others))
 
 
 def _volume_cm3(experiment: Experiment) -> float | None:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Mapping, Sequence
 from typing import Any
 
@@ -11,11 +10,11 @@ import numpy as np
 
 from ...errors import InputError
 from ...measured import Experiment
-from ..effect import Effect, Parameter, laws
-from ..effects import acted
-from .drift import largest_reading
-from .instruments import before_the_gauge
-from .unit_pressure import REFERENCE_C, TIMED, UnitPressure, UnitResponse, believed
+from ..effect import Effect, offered
+from ..effects import Acting
+from ..effects.declaration import Data, Setting
+from ..parameter import Parameter
+from .unit_pressure import TO_THE_SUPPLY, UnitPressure, UnitResponse, believed
 
 Array = np.ndarray[Any, Any]
 
@@ -25,7 +24,6 @@ KIND = "unit_pose"
 STATIONS = tuple(np.arange(0.0, 360.0, 45.0).tolist())
 # Of the fixture's protractor, or of how upright its base stands.
 TILT = Parameter("pose_tilt_deg", "deg", -10.0, 10.0, 0.0, (), "fixtures set by eye or level", spread=1.0)
-ACTING = ("temperature_drift", "pressure_offset", "pressure_gain", "pressure_nonlinearity")
 ANGLE = "angle_deg"
 
 
@@ -46,11 +44,10 @@ class UnitPose:
         # Zero, modulus and discrepancy are shared with a driven unit: it is the same unit.
         driven = UnitPressure(responses)
         static = [e for e in driven.effects if e.name in responses[0].variants]
-        here = [attrs.evolve(e, kinds=(KIND,)) for e in TIMED if e.name in ACTING]
-        self.effects = (*here, *(attrs.evolve(e, kinds=(KIND,)) for e in static), *laws(KIND, experiments))
+        data = Data(kind=KIND, experiments=experiments)
+        self.effects = (*(attrs.evolve(e, kinds=(KIND,)) for e in static), *offered(data))
         self._driven = driven
-        self._largest_kPa = largest_reading("pressure_kPa", KIND, experiments)
-        self._sizes = {e.name: e.keys[0] for e in static}
+        self._largest_kPa = data.largest("pressure_kPa")
         self._around = _around(responses)
         curved = tuple(p for p in driven.nuisances if not p.linear)
         asked = [(self._stations(e)[0], e) for e in experiments if e.kind == KIND]
@@ -65,21 +62,16 @@ class UnitPose:
 
         Raises InputError where no responses are of its scale and axis.
         """
-        get = values.get
-        modulus = get("modulus_factor", 1.0)
-        kelvin = experiment.temperature_C - REFERENCE_C
-        modulus *= 1.0 + get("temperature_drift.per_K", 0.0) * (kelvin if math.isfinite(kelvin) else 0.0)
-        p = before_the_gauge(experiment["pressure_kPa"], values, self._largest_kPa)
-        p = acted("pressure", experiment, p, values, self._largest_kPa)
+        acting = Acting(KIND, values, Setting(experiment=experiment, largest=self._largest_kPa))
+        p = acting.along(experiment["pressure_kPa"], *TO_THE_SUPPLY)
+        modulus = acting.along(values.get("modulus_factor", 1.0), "modulus")
         p = self._driven.discrepant(p / modulus, values)
-        static = self._driven.static(values)
-        if "gravity" in static:
-            static["gravity"] = static["gravity"] / modulus
+        static = self._driven.static(values, modulus)
         stations = self._stations(experiment)
         row = stations[0].channels.index(ANGLE)
         each = np.stack([r.at(p, static)[row] for r in stations])
-        share = between_stations(experiment["orientation_deg"] + get(TILT.name, 0.0))
-        return ((share * each).sum(axis=0) + get("angle_zero_deg", 0.0))[None]
+        share = between_stations(experiment["orientation_deg"] + values.get(TILT.name, 0.0))
+        return ((share * each).sum(axis=0) + values.get("angle_zero_deg", 0.0))[None]
 
     def _stations(self, experiment: Experiment) -> tuple[UnitResponse, ...]:
         axis = tuple(experiment.orientation_axis)

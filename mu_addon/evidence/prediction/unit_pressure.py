@@ -14,30 +14,21 @@ import numpy as np
 from ...errors import InputError
 from ...measured import Experiment
 from ...measured.pose import Direction, X, down
+from ..camera import View
 from ..drawn import Surface
-from ..effect import Effect, Parameter, laws
-from ..effects import acted
-from .camera import camera_effects, read_by_camera
-from .drift import drift, drifts, largest_reading, zeroed
-from .effective_pressure import in_the_chambers, play_operator, remembered
-from .flat_obstacle import NAME as CONTACT
-from .flat_obstacle import ObstacleResponse, contact_effect
-from .instruments import before_the_gauge, gauge
-from .marker_slip import Recordings, slip_effects, slipped
+from ..effect import Effect, offered
+from ..effects import LOADS, Acting
+from ..effects.declaration import DRIVEN, Data, Setting
+from ..effects.marker_slip import Recordings
+from ..lags import cycles
+from ..parameter import Parameter
+from .flat_obstacle import CONTACT, ObstacleResponse
 
 Array = np.ndarray[Any, Any]
 
 KIND = "unit_pressure"
-# Kinds that drive a unit over time, with history.
-DRIVEN = (KIND, "pressure_step", "blocked_force")
-REFERENCE_C = 23.0
-# Smaller reversals are noise of the gauge.
-DEADBAND_kPa = 0.2
 # Factor on the last computed pressure up to which the response is extrapolated along its end's slope.
 BEYOND = 1.25
-# Of the largest reading, possible drift of a gauge's zero: data sheets allow 0.25 to 2 % of full scale, a few
-# times the reading.
-GAUGE_SHARE = 0.05
 # Sizes of variants whose curves a response keeps.
 REMEMBERED = 64
 
@@ -257,104 +248,27 @@ def zero_of(channel: str) -> str:
     return f"{head}_zero_{unit}"
 
 
-# Effects in time; those of the unit itself come as variants of its response.
-TIMED = (
-    Effect(
-        "viscoelasticity",
-        (
-            Parameter("share", "", 0.0, 0.7, 0.0, (0.1,), "share of the instantaneous modulus that relaxes"),
-            Parameter("time_s", "s", 0.02, 1000.0, 1.0, (0.5, 5.0, 50.0), "relaxation time"),
-        ),
-        (KIND,),
-    ),
-    Effect(
-        "rate_independent_hysteresis",
-        (
-            Parameter("share", "", 0.0, 0.6, 0.0, (0.1,), "share of the stiffness carried by friction"),
-            Parameter("threshold_kPa", "kPa", 0.05, 30.0, 2.0, (0.7, 3.0, 9.0), "pressure at which it slips"),
-        ),
-        (KIND,),
-    ),
-    Effect(
-        "mullins_softening",
-        (
-            Parameter("softening", "", 0.0, 0.7, 0.0, (0.1,), "1/r of Ogden and Roxburgh 1999"),
-            Parameter("energy_share", "", 0.02, 2.0, 0.3, (0.1, 0.6), "m of Ogden and Roxburgh 1999"),
-        ),
-        (KIND,),
-    ),
-    Effect(
-        "fatigue_drift",
-        (Parameter("per_decade", "", 0.0, 0.4, 0.0, (0.03,), "modulus lost in ten times the cycles"),),
-        (KIND,),
-    ),
-    Effect(
-        "temperature_drift",
-        (Parameter("per_K", "1/K", -0.05, 0.05, 0.0, (-0.005,), "modulus lost a kelvin"),),
-        (KIND,),
-    ),
-    *gauge(KIND),
-    Effect(
-        "line_lag",
-        (Parameter("time_s", "s", 0.0, 5.0, 0.0, (0.05, 0.5), "resistance times the chambers' volume"),),
-        (KIND,),
-    ),
-    Effect(
-        "leak",
-        (Parameter("conductance_ratio", "", 0.0, 1.0, 0.0, (0.1,), "of the leak over the line"),),
-        (KIND,),
-    ),
-    Effect(
-        "angle_offset", (Parameter("offset_deg", "deg", -30.0, 30.0, 0.0, (1.0,), "camera frame"),), (KIND,)
-    ),
-    Effect(
-        "clock_offset",
-        (Parameter("offset_s", "s", -2.0, 2.0, 0.0, (-0.1, 0.1), "clocks set by hand"),),
-        (KIND,),
-    ),
-)
+# Where effects act on a pressure, up to the supply; on that in the chambers; and on a modulus's pressure.
+TO_THE_SUPPLY = ("clock", "drift", "zero", "gain", "curve", "supply")
+IN_THE_LINE = ("leak", "line")
+IN_MEMORY = ("relaxation", "friction", "softening")
 
 
-# A second law of viscoelasticity: polymers relax over many decades of time, and if one relaxation time is too
-# few a drift of the gauge would be named instead.
-RELAXING = Effect(
-    "viscoelasticity",
-    (
-        Parameter("per_decade", "", 0.0, 0.2, 0.0, (0.03,), "share of the modulus that relaxes in a decade"),
-        Parameter("onset_s", "s", 0.02, 1000.0, 1.0, (0.5, 5.0), "when that begins"),
-    ),
-    (KIND,),
-    "all moduli relax with time, equally in each decade",
-)
+def driving_kPa(acting: Acting) -> Array:
+    """Pressure (n,) in kPa in the chambers, of the gauge's reading in an experiment."""
+    p = acting.along(acting.setting.experiment["pressure_kPa"], *TO_THE_SUPPLY)
+    # With a valve shut nothing flows between gauge and chambers: both see a leak.
+    return np.asarray(p if acting.setting.experiment.valve == "shut" else acting.along(p, *IN_THE_LINE))
 
 
-# A third one with a parameter more, tried where one of the two is found: relaxation times evenly by their
-# logarithms over some decades, which is near a stretched exponential and a Prony series of any length.
-SPREADING = Effect(
-    "viscoelasticity",
-    (
-        Parameter("spread_share", "", 0.0, 0.9, 0.0, (0.15,), "share of the modulus that relaxes in all"),
-        Parameter("middle_s", "s", 0.02, 1000.0, 1.0, (0.5, 10.0), "middle of the relaxation times"),
-        Parameter("decades", "", 0.0, 8.0, 0.0, (2.0,), "over which they spread"),
-    ),
-    (KIND,),
-    "all moduli relax with time, by times spread over some decades",
-    refines=True,
-)
+def remembered_kPa(time_s: Array, pressure_kPa: Array, values: Mapping[str, float]) -> Array:
+    """Pressure (n,) in kPa at which a unit without memory has the state of one whose supply gives these.
 
-
-# A second law of the line: the volume before the chambers (tube, filter, manifold) fills first. Two volumes,
-# each behind a resistance, have two real time constants, whatever their sizes.
-TWO_VOLUMES = Effect(
-    "line_lag",
-    (
-        Parameter("slower_s", "s", 0.0, 5.0, 0.0, (0.05, 0.5), "slower time of two volumes in a row"),
-        Parameter("faster_share", "", 0.0, 0.99, 0.3, (0.3,), "the other time, of the slower one"),
-    ),
-    (KIND,),
-    "two volumes of the air line fill in a row, so that the chamber pressure lags behind the gauge",
-    refines=True,
-)
+    time_s (n,): in s; values: by "effect.parameter". From rest; moduli as they are.
+    """
+    largest = float(np.abs(pressure_kPa).max())
+    setting = Setting(time_s=time_s, fed=1.0, reference_kPa=largest, before_kPa=0.0)
+    return np.asarray(Acting(KIND, values, setting).along(pressure_kPa, *IN_THE_LINE, *IN_MEMORY))
 
 
 class UnitPressure:
@@ -396,29 +310,13 @@ class UnitPressure:
         self.nuisances = (*self.nuisances, *errors.values(), *of_design.values())
         static = {name: Effect(name, (p,), (self.kind,)) for name, p in known.items() if name not in errors}
         walls = [wall for r in self._responses for wall in r.walls.items()]
-        if walls:
-            static[CONTACT] = contact_effect(walls, self.kind)
-        self._largest_kPa = largest_reading("pressure_kPa", self.kind, experiments)
-        drifting = drifts("pressure_drift", "kPa", GAUGE_SHARE * self._largest_kPa, self.kind, experiments)
-        camera = camera_effects(self.channels_known, self.kind, experiments)
         self._recordings = Recordings(experiments)
-        slips = slip_effects(self.channels_known, self.kind, self._recordings)
-        timed = zeroed(TIMED, self.kind, experiments)
-        self.effects = (
-            *timed,
-            RELAXING,
-            SPREADING,
-            TWO_VOLUMES,
-            *static.values(),
-            *drifting,
-            *laws(self.kind, experiments),
-            *camera,
-            *slips,
-        )
+        data = Data(kind=self.kind, experiments=experiments, channels=self.channels_known, walls=tuple(walls))
+        self._largest_kPa = data.largest("pressure_kPa")
+        self.effects = (*static.values(), *offered(data))
         own = {n: p.name for n, p in errors.items()} | {name: name for name in of_design}
+        static |= {e.name: e for e in self.effects if walls and e.name == CONTACT}
         self._sizes = {e.name: e.keys[0] for e in static.values()} | own
-        after = (e.name for e in (*camera, *slips))
-        self._after = (*after, *self._sizes.values(), *self._zeros[self.channels_known], *DISCREPANCIES)
         self._effective: dict[Any, tuple[Experiment, Array]] = {}
         self.reference_kPa = max(float(np.abs(r.pressures_kPa).max()) for r in self._responses)
 
@@ -435,29 +333,42 @@ class UnitPressure:
         Raises InputError where no response is near the experiment's scale and orientation.
         """
         response = self._response(experiment)
-        pressure = self.discrepant(self._remembered_kPa(experiment, values), values)
-        static = self.static(values)
-        if "gravity" in static:
-            # Weight bends a stiffer unit less, in proportion.
-            static["gravity"] = static["gravity"] / values.get("modulus_factor", 1.0)
-        zeros = [
-            values.get(zero, 0.0) + (values.get("angle_offset.offset_deg", 0.0) if c == "angle_deg" else 0.0)
-            for c, zero in zip(response.channels, self._zeros[response.channels], strict=True)
-        ]
-        y = self._moving(experiment, response.at(pressure, static), values)
-        y = read_by_camera(response.channels, y, experiment["time_s"], experiment.scale, values)
-        y = slipped(response.channels, y, response.rest, experiment, self._recordings, values)
-        y = np.add(y, np.array(zeros)[:, None], order="C")
+        acting = Acting(self.kind, values, self._setting(experiment, response, values))
+        pressure = self.discrepant(self._remembered_kPa(acting, values), values)
+        y = response.at(pressure, self.static(values, values.get("modulus_factor", 1.0)))
+        y = acting.along(y, "swing")
+        if acting.at("view"):
+            y = acting.along(View(), "view").read(response.channels, y, experiment.scale)
+        y = acting.along(y, "surface")
+        zeros = np.array([values.get(zero, 0.0) for zero in self._zeros[response.channels]])
+        y = acting.along(np.add(y, zeros[:, None], order="C"), "read")
         kept = [i for i, c in enumerate(response.channels) if c in experiment.columns]
         return y if len(kept) == len(y) else y[kept]
 
-    def _moving(self, experiment: Experiment, still: Array, values: Mapping[str, float]) -> Array:
-        """Channels (c, n) of a moving unit from those in equilibrium (c, n): the same, without inertia."""
-        return still
+    def _setting(
+        self, experiment: Experiment, response: UnitResponse, values: Mapping[str, float]
+    ) -> Setting:
+        past = self._past.get(experiment.name, PressureHistory())
+        return Setting(
+            experiment=experiment,
+            time_s=experiment["time_s"],
+            largest=self._largest_kPa,
+            fed=1.0,
+            past=past,
+            reference_kPa=self.reference_kPa,
+            before_kPa=max(past.peak_kPa, -past.trough_kPa) / values.get("modulus_factor", 1.0),
+            channels=response.channels,
+            rest=response.rest,
+            recordings=self._recordings,
+        )
 
-    def static(self, values: Mapping[str, float]) -> dict[str, float]:
-        """Sizes by name of the response's variants, from values by key."""
-        return {name: values[key] for name, key in self._sizes.items() if key in values}
+    def static(self, values: Mapping[str, float], modulus: Any = 1.0) -> dict[str, Any]:
+        """Sizes by name of the response's variants, from values by key, at a factor on the modulus.
+
+        Weight bends a stiffer unit less, in proportion.
+        """
+        sizes = {name: values[key] for name, key in self._sizes.items() if key in values}
+        return {name: size / modulus if name in LOADS else size for name, size in sizes.items()}
 
     def discrepant(self, pressure: Array, values: Mapping[str, float]) -> Array:
         """Effective pressures (n,) in kPa with the discrepancy of the model's response."""
@@ -467,45 +378,29 @@ class UnitPressure:
         x = pressure / self.reference_kPa
         return np.asarray(pressure + self.reference_kPa * (second * x**2 + third * x**3))
 
-    def _remembered_kPa(self, experiment: Experiment, values: Mapping[str, float]) -> Array:
+    def _remembered_kPa(self, acting: Acting, values: Mapping[str, float]) -> Array:
         """`effective_kPa`, cached: derivatives by later effects (camera, static effects) need it again."""
-        own = frozenset((k, v) for k, v in values.items() if not k.startswith(self._after))
-        key = experiment.name, id(experiment), own
+        experiment, modulus = acting.setting.experiment, values.get("modulus_factor", 1.0)
+        own = acting.at(*TO_THE_SUPPLY, *IN_THE_LINE, "modulus", *IN_MEMORY)
+        key = experiment.name, id(experiment), modulus, own
         if key not in self._effective:
             if len(self._effective) >= REMEMBERED:
                 self._effective.clear()
             # With the experiment, whose identity could otherwise be reused.
-            self._effective[key] = experiment, self.effective_kPa(experiment, values)
+            self._effective[key] = experiment, self._effective_kPa(acting, modulus)
         return self._effective[key][1]
 
     def effective_kPa(self, experiment: Experiment, values: Mapping[str, float]) -> Array:
         """Pressure (n,) in kPa at which the base unit has the state of the unit with these values.
 
-        values: by key, as in `Simulator`. Applied in this order: clock offset, drift, offset, gain and curve
-        of the gauge, limits of the supply, leak and line lag (with an open valve), modulus with temperature
-        and fatigue, viscoelasticity, hysteresis, Mullins softening.
+        values: by key, as in `Simulator`.
         """
-        t, p = experiment["time_s"], experiment["pressure_kPa"]
-        past = self._past.get(experiment.name, PressureHistory())
-        get = values.get
-        if delay := get("clock_offset.offset_s", 0.0):
-            p = np.interp(t - delay, t, p)
-        p = p - drift("pressure_drift", t, values)
-        p = before_the_gauge(p, values, self._largest_kPa)
-        p = acted("pressure", experiment, p, values, self._largest_kPa)
-        # With a valve shut nothing flows between gauge and chambers: both see a leak.
-        if experiment.valve != "shut":
-            p = in_the_chambers(t, p, values)
-        modulus: Any = get("modulus_factor", 1.0)
-        if per_K := get("temperature_drift.per_K", 0.0):
-            kelvin = experiment.temperature_C - REFERENCE_C
-            modulus = modulus * (1.0 + per_K * (kelvin if math.isfinite(kelvin) else 0.0))
-        if per_decade := get("fatigue_drift.per_decade", 0.0):
-            done = past.cycles + cycles(experiment["pressure_kPa"])
-            modulus = modulus * (1.0 - per_decade * np.log10(1.0 + done))
-        p = p / modulus
-        before = max(past.peak_kPa, -past.trough_kPa) / get("modulus_factor", 1.0)
-        return remembered(t, p, values, self.reference_kPa, before)
+        setting = self._setting(experiment, self._response(experiment), values)
+        return self._effective_kPa(Acting(self.kind, values, setting), values.get("modulus_factor", 1.0))
+
+    def _effective_kPa(self, acting: Acting, modulus: float) -> Array:
+        p = driving_kPa(acting) / acting.along(modulus, "modulus")
+        return np.asarray(acting.along(p, *IN_MEMORY))
 
     def _response(self, experiment: Experiment) -> UnitResponse:
         how = experiment.scale, experiment.orientation_deg, experiment.orientation_axis
@@ -528,14 +423,3 @@ class UnitPressure:
                 "simulate the unit there, or leave the experiment out",
             )
         return self._responses[nearest]
-
-
-def cycles(p: Array) -> Array:
-    """Number of cycles completed (n,): travel of the pressure p (n,) in kPa over twice its range.
-
-    Reversals smaller than `DEADBAND_kPa` are ignored.
-    """
-    smooth = play_operator(p, DEADBAND_kPa)
-    travel = np.concatenate([[0.0], np.cumsum(np.abs(np.diff(smooth)))])
-    extent = float(np.ptp(smooth))
-    return travel / (2.0 * extent) if extent else travel

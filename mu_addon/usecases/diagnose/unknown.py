@@ -21,10 +21,12 @@ from ...evidence.fit import Fit, Fitter, interval
 from ...evidence.prediction.unit_pressure import MODULUS, zero_of
 from ...evidence.record import record
 from ...evidence.simulator import Composite
-from ...files import write_csv
+from ...evidence.simulators import of_a_unit
+from ...evidence.unit_fem import UnitSettings
 from ...measured import Experiment
 from ...optimization.freedoms import Freedom, changed_unit, read_freedoms
 from ...reading import text_in
+from ...run.study import Tell
 from ...toml_reader import parsed_toml
 
 Array = np.ndarray[Any, Any]
@@ -206,8 +208,8 @@ class Shapes:
         """Plain data."""
         return attrs.asdict(self) | {"words": self.words()}
 
-    def write(self, path: Path) -> None:
-        """Write a row a shape, what is fitted before what is simulated."""
+    def table(self) -> tuple[list[str], list[tuple[Any, ...]]]:
+        """Columns and rows, a row a shape, what is fitted before what is simulated."""
         names, experiments = list(self.fitted[0].values), list(self.fitted[0].predicted)
         head = ["of", *names, "modulus_factor", "zero", "misfit", "at_a_bound", *experiments]
         rows = [
@@ -215,7 +217,7 @@ class Shapes:
             for of, every in (("fit", self.fitted), ("simulation", self.simulated))
             for s in every
         ]
-        write_csv(path, head, rows)
+        return head, rows
 
 
 def shapes(
@@ -298,3 +300,31 @@ def leading(found: Shapes, unknown: Unknown, designs: Designs, unit: Unit) -> De
             at.append(values)
             units.append(drawn)
     return designs.also(at, units) if units else None
+
+
+@attrs.frozen(eq=False)
+class Shaped:
+    """What fits, and settings of the unit's simulation with every design that was simulated."""
+
+    settings: UnitSettings
+    fits: Shapes
+
+
+def shaped(
+    unknown: Unknown, settings: UnitSettings, unit: Unit, experiments: Sequence[Experiment], tell: Tell
+) -> Shaped:
+    """What the data say about unknown parameters without effects.
+
+    Where the surface between designs fits best, units are simulated and it is laid anew.
+    """
+    for round_ in range(ROUNDS + 1):
+        assert settings.designs is not None
+        alone = attrs.evolve(settings, effects=())
+        simulators, _ = of_a_unit(experiments, unit, tell.cache, tell, alone)
+        surfaces = [s for simulator in simulators.values() for s in getattr(simulator, "surfaces", ())]
+        found = shapes(unknown, settings.designs, surfaces, Composite(simulators), experiments)
+        more = leading(found, unknown, settings.designs, unit)
+        if more is None or round_ == ROUNDS:
+            break
+        settings = attrs.evolve(settings, designs=more)
+    return Shaped(settings, found)

@@ -20,17 +20,18 @@ from ...evidence.effect import (
     bare,
     readable,
 )
+from ...evidence.effects import DECLARED
+from ...evidence.effects.marker_slip import Recordings
 from ...evidence.found_causes import Cause
 from ...evidence.pooled import sizes_of
-from ...evidence.prediction.marker_slip import Recordings
 from ...evidence.prediction.unit_pressure import MODULUS
 from ...evidence.record import KNOWN
 from ...evidence.scatter import STATED, noise_limit
 from ...evidence.sensitivity import best_seen
+from ...evidence.simulator import bends
 from ...evidence.verdict import Verdict
 from ...measured import Experiment
 from ...run.parts import listed
-from .remedies import in_the_simulation, what_to_do
 
 # Of the table of dependences: the size of what is left against the data's own spread.
 SPREAD = "spread"
@@ -72,6 +73,15 @@ ASK_STRUTS = "If specimens were drawn with struts other than the unit's, give th
 MOST_LIMITS = 5
 # Most proposed measurements for effects that the data cannot show.
 MOST_SHOWN = 3
+
+
+def subtitle(experiments: Sequence[Experiment], self_contact: bool) -> str:
+    """The experiments, and how the unit that they bend was modelled."""
+    held, count = sum(e.role == "held_out" for e in experiments), len(experiments)
+    kinds = listed([readable(k) for k in dict.fromkeys(e.kind for e in experiments)])
+    words = f"{count} experiment{'s' if count > 1 else ''} ({kinds}), {held or 'none'} of them held out"
+    walls = f"walls {'kept apart' if self_contact else 'may cross'}"
+    return f"{words}; the unit as printed, {walls}" if bends(experiments) else words
 
 
 def called(effect: Effect) -> str:
@@ -427,7 +437,7 @@ def to_do(verdict: Verdict) -> str:
         return "Make the next measurement below before anything is changed."
     if verdict.kind == "unexplained":
         return f"Do not trust the simulation to better than {_error(verdict)} until this is explained."
-    doubtful = any(in_the_simulation(name) for name in verdict.in_question - {*verdict.names})
+    doubtful = any(not DECLARED[name].instrument for name in verdict.in_question - {*verdict.names})
     return what_to_do(verdict.names, not (doubtful or verdict.refused or verdict.selection.left))
 
 
@@ -450,3 +460,13 @@ def _of_one_only(cause: Cause) -> str:
 
 def _upper(text: str) -> str:
     return text[:1].upper() + text[1:]
+
+
+def what_to_do(effects: tuple[str, ...], sure: bool = True) -> str:
+    """Remedies for these causes, a sentence each; empty without any.
+
+    sure: nothing inside the simulation would do as well; only then is it said to be right.
+    """
+    right = "; the simulation is not at fault"
+    sentences = (DECLARED[n].remedy + right * (sure and DECLARED[n].instrument) for n in effects)
+    return " ".join(f"{text[:1].upper()}{text[1:]}." for text in dict.fromkeys(sentences))

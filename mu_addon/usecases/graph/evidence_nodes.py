@@ -8,7 +8,7 @@ from pathlib import Path
 from ...errors import InputError
 from ...graph.definition import FOLDER, Call, Definition, Input, Output, Outputs, setting
 from ...measured import read_folder
-from .shared_settings import SELF_CONTACT, of_orders
+from .studies import node_of
 
 DATA, NUMBERS = "Data", "Number"
 COMPARED = ("unit", "study", "grasp", "diagnosis")
@@ -60,25 +60,7 @@ def evidence_nodes() -> tuple[Definition, ...]:
             make=_data,
             remark=lambda outputs: f"{len(outputs['data'].experiments)} experiments",
         ),
-        Definition(
-            "diagnose",
-            "Diagnose",
-            DATA,
-            "the effects that the model lacks, by measured data",
-            (
-                Input("data", ("data",), "link a node Measured Data"),
-                Input("unit", ("unit",), "the unit on which the data were measured", needed=False),
-            ),
-            (
-                Output("diagnosis", "diagnosis", "the verdict"),
-                Output("model", "model", "the extended model, for a node Simulate"),
-            ),
-            (SELF_CONTACT,),
-            order=of_orders("diagnose_order"),
-            read=lambda call, done: {"diagnosis": done, "model": done.folder / "model.toml"},
-            muting="this node and those that need it are not computed",
-            remark=lambda outputs: "{verdict}: {headline}".format(**outputs["diagnosis"].summary),
-        ),
+        node_of("diagnose"),
         Definition(
             "compare",
             "Compare",

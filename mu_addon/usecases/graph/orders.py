@@ -12,13 +12,10 @@ from ...design.rigid_body import require_beside
 from ...errors import InputError
 from ...graph.definition import Call, Outputs
 from ...graph.evaluation import Finished, Order
-from ...measured import Measured
 from ...meshing.settings import MeshSettings
 from ...studies.unit_inputs import protocol_of
 from ...studies.unit_ranking import UnitStudy
 from ...studies.use_case import use_case
-from ..diagnose.job import Job as DiagnoseJob
-from ..diagnose.run import USE_CASE as DIAGNOSE
 from ..simulate_and_place.extended_unit import read_extended
 from ..simulate_and_place.named_effects import NamedEffects
 from .parts import solid_of
@@ -138,11 +135,3 @@ def solid_order(call: Call) -> Order:
     unit, given, path = solid_of(call)
     job = UnitStudy(unit=unit, stages=("design",), quality=given.quality, body=given.body, path=path)
     return Order(use_case("design"), job)
-
-
-def diagnose_order(call: Call) -> Order:
-    """Run that diagnoses measured data."""
-    design, measured = call.inputs["unit"], call.inputs["data"]
-    assert isinstance(measured, Measured)
-    unit = None if design is None else design.unit
-    return Order(DIAGNOSE, DiagnoseJob(measured, unit, self_contact=call.settings["self_contact"]))

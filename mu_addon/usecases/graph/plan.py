@@ -19,7 +19,6 @@ SECONDS = {
     "place": 320.0,
     "homogenize": 120.0,
     "grip": 900.0,
-    "diagnose": 240.0,
     "solid": 10.0,
     "sweep": 600.0,
     "calibrate": 2.0,

@@ -6,6 +6,8 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+import attrs
+
 from ...design.gates import GateError
 from ...graph.definition import Call, Definition, Input, Output, Outputs, Setting
 from ...studies import study
@@ -23,6 +25,7 @@ SOCKETS: dict[str, tuple[Input, Callable[[Any], Any]]] = {
     ),
     "gripper": (Input("gripper", ("gripper",), "link a gripper"), lambda linked: linked),
     "recording": (Input("recording", ("recording",), "link a node Record or Recording"), Path),
+    "measured": (Input("data", ("data",), "link a node Measured Data"), lambda linked: linked),
     "calibration": (Input("calibration", ("calibration",), "link a node Calibrate or Calibration"), Path),
 }
 """By kind of an input that is no plain value: its socket, and the value of what is linked there."""
@@ -49,7 +52,7 @@ def node_of(name: str) -> Definition:
         node.label or kind.__name__,
         node.category,
         node.text,
-        tuple(SOCKETS[one.kind][0] for one in inputs.values() if one.kind in SOCKETS),
+        tuple(_socket(one) for one in inputs.values() if one.kind in SOCKETS),
         tuple(Output(*one) for one in node.outputs),
         tuple(
             Setting(d, one.path)
@@ -64,6 +67,11 @@ def node_of(name: str) -> Definition:
     )
 
 
+def _socket(one: Any) -> Input:
+    """The socket of an input, of one that a study may do without too."""
+    return attrs.evolve(SOCKETS[one.kind][0], needed=getattr(one, "needed", True))
+
+
 def _order(kind: type[Study], call: Call) -> Order:
     from ...graph.evaluation import Order
     from ...studies.use_case import use_case
@@ -75,7 +83,8 @@ def _order(kind: type[Study], call: Call) -> Order:
     for name, one in kind.inputs().items():
         if one.kind in SOCKETS:
             socket, value_of = SOCKETS[one.kind]
-            values[name] = value_of(call.inputs[socket.name])
+            linked = call.inputs[socket.name]
+            values[name] = None if linked is None else value_of(linked)
         elif one.kind == "window":
             values[name] = one.made((call.inputs["unit"].path,), values)
         elif one.descriptions and name not in kind.node.hidden:

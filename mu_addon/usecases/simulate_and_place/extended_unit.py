@@ -11,10 +11,11 @@ import attrs
 from ...design.parameters import Unit
 from ...errors import InputError
 from ...evidence.effect import readable
+from ...evidence.effects import STATIC as EFFECTS
 from ...evidence.extended import ExtendedModel, Fitted, load_model
 from ...evidence.lattice_fem import printed
 from ...evidence.prediction.lattice_compression import SLENDER, ComputedCell
-from ...evidence.unit_effects import EFFECTS, Body
+from ...evidence.unit_body import Body
 from ...run.parts import listed
 from ..diagnose.words import alternatives
 from .named_effects import NAMES, NamedEffects, law_within

@@ -11,10 +11,10 @@ import numpy as np
 
 from ...errors import InputError, did_you_mean
 from ...evidence.effect import Parameter
-from ...evidence.effects import DECLARED
-from ...evidence.prediction.effective_pressure import in_the_chambers, remembered
-from ...evidence.prediction.unit_pressure import RELAXING, SPREADING, TIMED, TWO_VOLUMES
-from ...evidence.unit_effects import EFFECTS, Body
+from ...evidence.effects import DECLARED, laws_of
+from ...evidence.effects import STATIC as EFFECTS
+from ...evidence.prediction.unit_pressure import remembered_kPa
+from ...evidence.unit_body import Body
 from ...reading import is_finite
 from .settings import ORIENTATION
 
@@ -40,7 +40,7 @@ _OF_UNIT = (
     "rate_independent_hysteresis",
     "mullins_softening",
 )
-IN_TIME = {e.name: e for e in TIMED if e.name in _OF_UNIT}
+IN_TIME = {name: laws_of("unit_pressure")[name] for name in _OF_UNIT}
 NAMES = (*STATIC, *_OF_UNIT)
 # Each in a few words, its size included.
 _DESCRIPTIONS = {
@@ -130,8 +130,7 @@ class NamedEffects:
         if not self.in_time:
             return pressure_kPa
         values = {f"{name}.{p}": v for name, given in self.values.items() for p, v in given.items()}
-        chambers = in_the_chambers(time_s, pressure_kPa, values)
-        return remembered(time_s, chambers, values, float(np.abs(pressure_kPa).max()))
+        return remembered_kPa(time_s, pressure_kPa, values)
 
     @property
     def has_gravity(self) -> bool:
@@ -197,13 +196,9 @@ def _laws(name: str) -> tuple[tuple[Parameter, ...], ...]:
     """Sets of parameters by which an effect may be given, one for each law."""
     if name in STATIC:
         return ((EFFECTS[name].parameter,),)
-    own = IN_TIME[name].parameters
-    if name == "viscoelasticity":
-        return own, RELAXING.parameters, SPREADING.parameters
-    if name == "line_lag":
-        return own, TWO_VOLUMES.parameters
     # With the pressure that the energy of softening was relative to, which a diagnosis of units states.
-    return ((*own, REFERENCE),) if name == "mullins_softening" else (own,)
+    more = (REFERENCE,) if name == "mullins_softening" else ()
+    return tuple((*law.parameters, *more) for law in IN_TIME[name])
 
 
 def parameters_of(name: str, given: Iterable[str]) -> tuple[Parameter, ...] | None:

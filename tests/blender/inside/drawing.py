@@ -1,12 +1,21 @@
 """What panels say: they draw into something that takes every call and keeps the words."""
 
+import inspect
 from unittest.mock import MagicMock
 
 import bpy
 
+from mu_addon.blender.shared import registration
+
+
+def panels_of(*modules):
+    """Panels and menus of modules, in order."""
+    shown = bpy.types.Panel, bpy.types.Menu
+    return [cls for one in modules for cls in registration.classes_of(one) if issubclass(cls, shown)]
+
 
 def drawn(panels):
-    """All words that these panels show now."""
+    """All words that these panels, or those of a module, show now."""
     texts, layout = [], MagicMock()
     layout.panel.return_value = (layout, layout)
     for name in ("row", "column", "box", "split", "grid_flow"):
@@ -16,7 +25,7 @@ def drawn(panels):
     layout.operator.side_effect = lambda name, text="", **_: texts.append(text or name) or MagicMock()
     layout.prop.side_effect = lambda data, name, **_: name == "name" and texts.append(data.name)
     layout.template_icon.side_effect = lambda icon, scale: texts.append("a picture")
-    for panel in panels:
+    for panel in panels_of(panels) if inspect.ismodule(panels) else panels:
         if getattr(panel, "poll", lambda _: True)(bpy.context):
             seat = MagicMock(layout=layout, find_root=getattr(panel, "find_root", None))
             seat.show = lambda *words, panel=panel, seat=seat: panel.show(seat, *words)

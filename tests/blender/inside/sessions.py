@@ -71,10 +71,10 @@ def leave_a_simulation():
     uuid = root.mu_unit.uuid
     child = launch(root, "hang")
     watch(lambda: child.progress)
-    assert bpy.app.timers.is_registered(jobs._poll)
+    assert bpy.app.timers.is_registered(jobs._poll.function)
     bpy.ops.wm.read_homefile(use_empty=True)
-    assert jobs.running() == [f"{uuid}:simulate"]
-    assert bpy.app.timers.is_registered(jobs._poll)
+    assert [job.key for job in jobs.running()] == [f"{uuid}:simulate"]
+    assert bpy.app.timers.is_registered(jobs._poll.function)
     add()
     assert "other job" in drawn()
     return child._process.pid
@@ -90,14 +90,14 @@ def leave_a_lasting_run():
     own = folder / jobs.OWN_FOLDER
     child = Child([sys.executable, LOCKED, str(folder)], own, environment([ROOT]))
     key = SIMULATION.key(root)
-    jobs.last(
+    jobs.lasting_jobs.keep(
         jobs.lasting_jobs.Record(
             key, "arm: simulation", folder, jobs.lasting_jobs.now_s(), (("Model A", 9.0),), True
         )
     )
-    jobs.watch(key, child, "arm: simulation")
+    jobs.watch(key, child, "arm: simulation", heavy=True, lasts=True)
     watch(lambda: child.progress)
-    assert jobs.goes_on(key)
+    assert jobs._jobs[key].goes_on
     bpy.ops.wm.save_as_mainfile(filepath="arm.blend")
     return child.pid, folder
 
@@ -106,8 +106,9 @@ def find_a_lasting_run():
     """The next session finds it, with its unit or without, and stops it; returns how it ended."""
     begin()
     jobs._take_up()
-    (key,) = jobs.running()
-    assert jobs.title_of(key) == "arm: simulation"
+    (job,) = jobs.running()
+    key = job.key
+    assert job.title == "arm: simulation"
     bpy.ops.wm.open_mainfile(filepath="arm.blend")
     (root,) = unit_object.roots()
     child = SIMULATION.child(root)
@@ -115,7 +116,7 @@ def find_a_lasting_run():
     assert child.estimate.number == 1
     assert "is being simulated" in refused(bpy.ops.mu.simulate) or not bpy.ops.mu.simulate.poll()
     jobs._take_up()
-    assert jobs.running() == [key], "found once"
+    assert jobs.running() == [jobs._jobs[key]], "found once"
     assert bpy.ops.mu.job_cancel(key=key) == {"FINISHED"}
     watch(lambda: child.state != "running")
     mu_addon.unregister()
@@ -149,11 +150,11 @@ def leave_a_sensor(tmp_path):
     watch_sensor(lambda: s.watched.status["rows"] > rows + 20)
     sensor._render_ended()
 
-    assert bpy.app.timers.is_registered(sensor._poll)
+    assert bpy.app.timers.is_registered(sensor._poll.function)
     bpy.ops.wm.save_as_mainfile(filepath=str(tmp_path / "study" / "seat.blend"))
     bpy.ops.wm.read_homefile(use_empty=True)
     assert s.running
-    assert bpy.app.timers.is_registered(sensor._poll)
+    assert bpy.app.timers.is_registered(sensor._poll.function)
     before = s.watched.status["rows"]
     watch_sensor(lambda: s.watched.status["rows"] > before + 10)
     add()

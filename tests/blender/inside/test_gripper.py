@@ -25,7 +25,7 @@ from .acting import add, refused
 from .drawing import drawn as drawn_by
 from .jobs import ended
 
-PANELS = gripper_panel.CLASSES
+PANELS = gripper_panel
 
 
 def held(**settings):

@@ -1,5 +1,6 @@
 """Jobs in the header: one runs, the others wait; Cancel, and a notice at the end."""
 
+import re
 import sys
 from types import SimpleNamespace
 from unittest.mock import MagicMock
@@ -19,11 +20,15 @@ from mu_addon.blender.optimize import panel as optimize_panel
 from mu_addon.blender.optimize import state as optimization
 from mu_addon.blender.printing import panel as print_panel
 from mu_addon.blender.printing import state as printing
+from mu_addon.blender.sensor import panel as sensor_panel
+from mu_addon.blender.sensor import state as sensor
+from mu_addon.blender.simulate import panel as simulate_panel
 from mu_addon.blender.simulate import study_folder as studies
 from mu_addon.blender.simulate import timings
 from mu_addon.blender.simulate.job import SIMULATION, announced, plan_of
-from mu_addon.blender.simulate.panel import MU_PT_simulate, start_words
+from mu_addon.blender.simulate.panel import start_words
 from mu_addon.blender.unit import object as unit_object
+from mu_addon.errors import InputError
 from mu_addon.run.child import Child
 
 from .acting import add, refused
@@ -196,7 +201,7 @@ def test_a_quick_ranking_is_started_by_its_own_button(tmp_path, monkeypatch):
     monkeypatch.setattr(timings, "_file", lambda: tmp_path / "timings.json")
     root = add(preset="mu-0.75x")
     assert announced(root, quick=True)[0] < 0.5 * announced(root)[0]
-    assert "Quick Ranking, perhaps " in drawn([MU_PT_simulate])
+    assert "Quick Ranking, perhaps " in drawn(simulate_panel)
     given = {}
     monkeypatch.setattr(start_child, "start", lambda *_, **more: given.update(more))
     monkeypatch.setattr(start_child, "watch", lambda *_: None)
@@ -212,11 +217,12 @@ def test_a_quick_ranking_is_started_by_its_own_button(tmp_path, monkeypatch):
 
 def test_progress_redraws_sidebars_and_an_end_the_scene(monkeypatch):
     drawn = []
-    for name in ("redraw", "redraw_panels", "redraw_status"):
-        monkeypatch.setattr(start_child.viewports, name, lambda name=name: drawn.append(name))
+    for name in ("redraw", "redraw_regions", "redraw_status"):
+        monkeypatch.setattr(start_child.viewports, name, lambda *_, name=name: drawn.append(name))
     child = started(add(), "hang", monkeypatch)
-    watch(lambda: start_child._poll() and "redraw_panels" in drawn)
-    assert set(drawn) == {"redraw_panels", "redraw_status"}
+    drawn.clear()
+    watch(lambda: start_child._poll() and "redraw_regions" in drawn)
+    assert set(drawn) == {"redraw_regions", "redraw_status"}
     # Not with each look at the job: without a graphics card a frame takes the solver's time.
     monkeypatch.setattr(start_child, "REDRAW_S", 1e6)
     count = len(drawn)
@@ -241,45 +247,54 @@ def test_preferences_say_what_uninstalling_deletes(tmp_path, monkeypatch):
 
 
 SEATS = {
-    "print": (printing.PRINTING, print_panel.CLASSES, "print_check"),
-    "evidence": (evidence.DIAGNOSIS, [evidence_panel.MU_PT_evidence], "evidence_diagnose"),
-    "optimize": (optimization.OPTIMIZATION, [optimize_panel.MU_PT_optimize], "optimize"),
-    "grasp": (grasps.GRASP, gripper_panel.CLASSES, "grasp"),
+    "simulate": (SIMULATION, simulate_panel),
+    "print_check": (printing.PRINTING, print_panel),
+    "evidence_diagnose": (evidence.DIAGNOSIS, evidence_panel),
+    "optimize": (optimization.OPTIMIZATION, optimize_panel),
+    "sensor_calibrate": (sensor.CALIBRATION, sensor_panel),
+    "grasp": (grasps.GRASP, gripper_panel),
 }
-"""By the first word of its operators: kind of job, panels, the operator that starts it."""
+"""By the operator that starts it: kind of job, its panels."""
 
 
-@pytest.mark.parametrize("prefix", ["print", "evidence", "optimize", "grasp"])
-def test_a_panel_tells_how_its_job_ends_and_stops_it(prefix, blocks):
-    kind, panels, start = SEATS[prefix]
-    root = gripper() if prefix == "grasp" else add()
-    if prefix == "evidence":
-        root.mu_evidence.folder = str(blocks)
-    for what in ("targets", "freedoms") if prefix == "optimize" else ():
+@pytest.mark.parametrize(
+    "start", ["simulate", "print_check", "evidence_diagnose", "optimize", "sensor_calibrate", "grasp"]
+)
+def test_a_panel_tells_how_its_job_ends_and_stops_it(start, blocks):
+    kind, panels = SEATS[start]
+    root = gripper() if start == "grasp" else add()
+    root.mu_evidence.folder = str(blocks)
+    for what in ("targets", "freedoms") if start == "optimize" else ():
         bpy.ops.mu.optimize_list(what=what)
     assert getattr(bpy.ops.mu, start).poll()
-    folder = printing.folder_of(root, "check") if prefix == "print" else None
+    folder = kind.folder_of(root)
 
     def operator(name):
-        return getattr(bpy.ops.mu, f"{prefix}_{name}")
+        return getattr(bpy.ops.mu, f"{kind.prefix}{name}")
 
-    endings = {"reported_error": "thicker wall", "crash": "SIGSEGV", "wordless": "without a message"}
-    for how, expected in endings.items():
+    endings = {"good": "Done in", "garbage": "Done in", "reported_error": "thicker wall"}
+    for how, expected in {**endings, "crash": "SIGSEGV", "wordless": "without a message"}.items():
         ended(fake(kind, root, how, folder))
         assert expected in drawn(panels), (how, drawn(panels))
         assert operator("dismiss")() == {"FINISHED"}
         assert expected not in drawn(panels)
     child = fake(kind, root, "hang", folder)
     watch(lambda: child.progress)
-    assert "0.50 50%, motion" in drawn(panels)
-    assert f"mu.{prefix}_cancel" in drawn(panels)
-    assert not getattr(bpy.ops.mu, start).poll()
+    # Three seconds, counted down since the child said so.
+    assert re.search(r"0\.50 50%, motion, [0-3](\.\d)? s left", drawn(panels)), drawn(panels)
+    assert f"mu.{kind.prefix}cancel" in drawn(panels)
+    with pytest.raises(InputError, match="already"):
+        kind.start(root, folder, lambda folder: None)
+    if start != "sensor_calibrate":
+        assert not getattr(bpy.ops.mu, start).poll()
     # The unit's own simulation is another one.
-    assert not bpy.ops.mu.cancel.poll()
+    assert bpy.ops.mu.cancel.poll() == (start == "simulate")
     assert operator("cancel")() == {"FINISHED"}
+    assert "stopping" in drawn(panels)
     ended(child)
     assert "Cancelled" in drawn(panels)
     assert not operator("cancel").poll()
+    assert getattr(bpy.ops.mu, start).poll()
 
 
 def gripper():

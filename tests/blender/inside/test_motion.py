@@ -27,7 +27,7 @@ from mu_addon.design.anchors import anchor_points
 from mu_addon.usecases.simulate_and_place.charts import write_angle, write_delta
 
 from .acting import add, refused
-from .drawing import drawn
+from .drawing import drawn, panels_of
 
 
 def started(study):
@@ -484,19 +484,19 @@ def test_panels_show_the_motion(study):
     write_angle(study, np.array([-20.0, 0.0, 40.0]), np.array([-3.3, 0.0, 6.3]))
     write_delta(study, "alpha4", np.linspace(0.0, 0.1, 12).reshape(3, 4), np.arange(3.0), 0.1)
     root = add(preset="mu-0.75x")
-    panels = [kind for kind in results_panel.CLASSES if issubclass(kind, bpy.types.Panel)]
+    panels = [kind for kind in panels_of(results_panel) if issubclass(kind, bpy.types.Panel)]
     assert drawn(panels).count("imulated") == 1, "once is enough"
     root.mu_unit.study.folder = str(study)
-    texts = drawn(results_panel.CLASSES)
+    texts = drawn(results_panel)
     assert "Analysis mesh Without a sensor path0 Path α1 Path α2" in texts
     assert "Play" not in texts
     assert texts.count("a picture") == 1
     assert "Choose a sensor path" in texts
     bpy.ops.mu.path(name="alpha4")
-    assert drawn(results_panel.CLASSES).count("a picture") == 2
+    assert drawn(results_panel).count("a picture") == 2
     show(name="alpha4")
     root.mu_motion.field = "dJ_by_modulus_mm_per_MPa"
-    texts = drawn(results_panel.CLASSES)
+    texts = drawn(results_panel)
     assert "Play" in texts
     assert "Path α4, analysis mesh" in texts
     assert "without this field: alpha4" in texts

@@ -455,6 +455,7 @@ def editor(tree):
     return bpy.context.temp_override(window=window, area=area, region=region)
 
 
+@pytest.mark.nightly("tests/headless/test_graph.py::test_a_thicker_wall_bends_less_and_the_table_says_so")
 def test_a_tree_runs_in_a_process_of_its_own_and_its_states_stay_with_the_file(tmp_path):
     bpy.ops.wm.save_as_mainfile(filepath=str(tmp_path / "runs.blend"))
     tree = new("three-walls")

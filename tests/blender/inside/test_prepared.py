@@ -53,8 +53,8 @@ def test_a_solid_is_made_elsewhere_and_is_the_same(monkeypatch, tmp_path):
     made = corners(root.mu_unit.solid)
     assert unit_object.solid_is_current(root)
     assert (tmp_path / "it.stl").stat().st_size == 84 + 50 * len(root.mu_unit.solid.polygons)
-    (key,) = start_child.ended()
-    assert "STL" in start_child.title_of(key), "a file is told of when it is there"
+    (job,) = start_child.ended()
+    assert "STL" in job.title, "a file is told of when it is there"
     monkeypatch.undo()
     bpy.ops.mu.solid()
     assert np.array_equal(corners(root.mu_unit.solid), made)
@@ -67,8 +67,8 @@ def test_what_cannot_be_made_is_said(monkeypatch, tmp_path):
     bpy.ops.mu.export_stl(filepath=str(tmp_path / "none" / "it.stl"), quality="interactive")
     (tmp_path / "none").write_text("a file where a folder was meant")
     settled()
-    (key,) = start_child.ended()
-    assert start_child.child_of(key).state == "failed"
+    (job,) = start_child.ended()
+    assert job.child.state == "failed"
 
 
 @pytest.mark.nightly("test_a_solid_is_made_elsewhere_and_is_the_same")

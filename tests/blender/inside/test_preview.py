@@ -136,7 +136,7 @@ def test_a_preview_that_fell_behind_is_caught_up():
         root.mu_unit.chambers.count = 4
     assert unit_object.behind(root)
     for handler in bpy.app.handlers.undo_post:
-        if handler is live._after_undo_or_load:
+        if handler is live.catch_up:
             handler(bpy.context.scene)
     assert not unit_object.behind(root)
     tall = points_of(root, "actuator")[:, 2].max()

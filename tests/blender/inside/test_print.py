@@ -28,7 +28,7 @@ from .acting import add, refused
 from .drawing import drawn as drawn_by
 from .jobs import ended, fake
 
-PANELS = print_panel.CLASSES
+PANELS = print_panel
 
 
 def done(root, *, state="done"):
@@ -81,7 +81,7 @@ def test_a_check_from_start_to_markers(tmp_path):
     assert not bpy.ops.mu.print_show.poll()
     assert "Check the print first" in refused(bpy.ops.mu.print_marks)
     assert bpy.ops.mu.print_check() == {"FINISHED"}
-    assert "A job for the printer is running" in refused(bpy.ops.mu.print_export)
+    assert "The job for the printer is running" in refused(bpy.ops.mu.print_export)
     assert "mu.print_cancel" in drawn()
     done(root)
     found = printing.CHECK.found(root)

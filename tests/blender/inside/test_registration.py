@@ -53,14 +53,16 @@ def test_register_and_unregister_twice_leave_nothing(monkeypatch):
 @pytest.mark.own_process
 def test_a_failure_while_registering_leaves_nothing(monkeypatch):
     import mu_addon
-    from mu_addon.blender.sidebar import unit_panel as panels
+    from mu_addon.blender.shared import registration
+    from mu_addon.blender.sidebar import unit_panel
 
     def fails():
         raise RuntimeError("no")
 
     with monkeypatch.context() as patch:
-        patch.setattr(panels, "register", fails)
-        patch.setattr(panels, "unregister", lambda: None)
+        patch.setitem(
+            registration._declared[unit_panel.__name__], "fails", registration.Hook(9, fails, fails)
+        )
         with pytest.raises(RuntimeError, match="no"):
             mu_addon.register()
         assert not [name for name in dir(bpy.types) if name.startswith("MU_")]
@@ -140,6 +142,32 @@ def test_a_new_section_of_the_core_appears_by_itself():
 
     draw(Layout(), root, "design")
     assert Layout.shown[-2:] == ["depth_mm", "way"]
+
+
+@pytest.mark.own_process
+def test_a_button_is_one_file(tmp_path):
+    """The one of the page on extending, which is put beside the rooms' own files."""
+    import re
+    from pathlib import Path
+
+    import mu_addon
+    from mu_addon.blender import unit
+
+    page = Path(mu_addon.__file__).parents[1] / "docs" / "engineering" / "extend.md"
+    text = page.read_text(encoding="utf-8").split("## Add a panel button")[1]
+    (tmp_path / "thicken.py").write_text(re.search(r"```\n(.*?)```", text, re.DOTALL)[1], encoding="utf-8")
+    unit.__path__.append(str(tmp_path))
+    mu_addon.register()
+    from .acting import add
+    from .drawing import drawn
+
+    root = add()
+    places = [bpy.types.MU_PT_design, bpy.types.MU_MT_design_step]
+    assert drawn(places).count("mu.thicken") == 2
+    assert bpy.ops.mu.thicken() == {"FINISHED"}
+    assert abs(root.mu_unit.chambers.wall_mm - 1.0) < 1e-6
+    mu_addon.unregister()
+    assert not hasattr(bpy.types, "MU_OT_thicken")
 
 
 def test_values_survive_single_precision():

@@ -127,7 +127,7 @@ def test_unregister_ends_the_session():
     mu_addon.unregister()
     s.child._process.wait(PATIENCE_S)
     assert not hasattr(bpy.types.Object, "mu_sensor")
-    assert not bpy.app.timers.is_registered(sensor._poll)
+    assert not bpy.app.timers.is_registered(sensor._poll.function)
     mu_addon.register()
     assert sensor.of(add()) is None
 

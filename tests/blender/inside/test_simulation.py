@@ -2,7 +2,6 @@
 
 import importlib.util
 import json
-import re
 from unittest.mock import MagicMock
 
 import bpy
@@ -22,16 +21,16 @@ from mu_addon.blender.simulate import study_folder as studies
 from mu_addon.blender.simulate.job import SIMULATION, job_of
 from mu_addon.blender.unit import object as unit_object
 from mu_addon.blender.unit.base_classes import parameters
-from mu_addon.errors import InputError
 from mu_addon.meshing.settings import MeshSettings
 from mu_addon.report.motion_files import read_motion
 
 from .acting import add, refused
 from .drawing import drawn as drawn_by
+from .drawing import panels_of
 from .jobs import ended, launch, watch
 
-PANELS = [*unit_panel.CLASSES, *path_panel.CLASSES, *simulate_panel.CLASSES]
-PANELS += [results_panel.MU_PT_results, obstacle_panel.MU_PT_obstacles, *print_panel.CLASSES]
+PANELS = panels_of(unit_panel, path_panel, simulate_panel, print_panel)
+PANELS += [results_panel.MU_PT_results, obstacle_panel.MU_PT_obstacles]
 
 
 def drawn():
@@ -43,31 +42,6 @@ def test_panels_tell_what_a_child_says():
     root = add()
     assert "Nothing simulated yet" in drawn()
     assert "No solid built yet" in drawn()
-    child = launch(root, "hang")
-    watch(lambda: child.progress)
-    # Three seconds, counted down since the child said so.
-    assert re.search(r"0\.50 50%, motion, [0-3](\.\d)? s left", drawn()), drawn()
-    assert "mu.cancel" in drawn()
-    assert not bpy.ops.mu.simulate.poll()
-    assert bpy.ops.mu.cancel() == {"FINISHED"}
-    assert "stopping" in drawn()
-    ended(child)
-    assert "Cancelled" in drawn()
-    assert bpy.ops.mu.simulate.poll()
-    assert not bpy.ops.mu.cancel.poll()
-    assert bpy.ops.mu.dismiss() == {"FINISHED"}
-    assert "Cancelled" not in drawn()
-
-    for how, expected in {
-        "good": "Done in",
-        "reported_error": "no equilibrium",
-        "crash": "SIGSEGV",
-        "wordless": "without a message",
-        "garbage": "Done in",
-    }.items():
-        child = launch(root, how)
-        ended(child)
-        assert expected in drawn(), (how, drawn())
     launch(root, "reported_error")
     watch(lambda: not jobs.running())
     assert "thicker wall" in drawn()
@@ -153,13 +127,6 @@ def test_folders_of_studies(tmp_path):
     assert root.mu_unit.study.folder.startswith("//seat.mu")
     root.mu_unit.title = "renamed"  # the results stay where they are
     assert studies.folder_of(root) == here / "seat.mu" / f"Grip-no.-1-{short}"
-
-
-def test_two_simulations_of_one_unit_are_refused():
-    root = add()
-    launch(root, "hang")
-    with pytest.raises(InputError, match="already"):
-        SIMULATION.start(root, studies.folder_of(root), lambda folder: None)
 
 
 @pytest.mark.slow

@@ -74,7 +74,7 @@ def test_each_step_runs_alone_with_its_own_parameters():
     assert round(props.waveguide.well_depth_mm, 4) == 0.3
 
 
-CHAMBERS = next(c for c in steps_operators.CLASSES if c.bl_idname == "mu.chambers")
+CHAMBERS = next(c for c in steps_operators.CLASSES if c.__name__ == "MU_OT_chambers")
 
 
 def redo_fields(operator):

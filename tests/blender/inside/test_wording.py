@@ -9,7 +9,9 @@ from mu_addon.blender.shared.panels import wrapped
 from mu_addon.blender.shared.wording import in_panel
 from mu_addon.blender.sidebar import menus
 from mu_addon.evidence.effects import DECLARED
-from mu_addon.usecases.diagnose.remedies import what_to_do
+from mu_addon.usecases.diagnose.words import what_to_do
+
+from .drawing import panels_of
 
 
 def test_what_to_do_about_a_cause_names_buttons_and_no_options():
@@ -45,7 +47,7 @@ def test_the_menu_search_finds_every_action_on_a_unit():
     layout, found = MagicMock(), set()
     for name in ("operator", "operator_menu_enum"):
         getattr(layout, name).side_effect = lambda name, *_, **__: found.add(name) or MagicMock()
-    for menu in menus.CLASSES:
+    for menu in panels_of(menus):
         menu.draw(MagicMock(layout=layout), bpy.context)
     menus._add(MagicMock(layout=layout), bpy.context)
     every = {f"mu.{name}" for name in dir(bpy.ops.mu)}

@@ -1,0 +1,49 @@
+"""The analysis mesh of a motion, by region, as objects whose shape is set: beside a unit or in its place."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any
+
+import bpy
+import numpy as np
+
+from ...report.motion_files import REGIONS, Motion
+from ..preview import skeletons
+from ..shared import displays
+
+
+def of_motion(motion: Motion, cut: bool) -> tuple[dict[str, Any], dict[str, Any]]:
+    """Vertices (s, v, 3) in mm at each state of Model A and triangles (t, 3), by region; cut: of a half."""
+    vertices, triangles = {}, {}
+    for region in REGIONS:
+        skin = motion.skin(region, cut)
+        moved = skin.of_nodes(motion.mesh.nodes) + skin.of_nodes(motion.model_a)
+        vertices[region], triangles[region] = moved.astype(np.float32), skin.triangles
+    return vertices, triangles
+
+
+def put(
+    root: Any, mark: str, title: str, vertices: Mapping[str, Any], triangles: Mapping[str, Any]
+) -> list[Any]:
+    """Displays of a mark, one a region, with vertices (v, 3); those that are there are taken; return them."""
+    found = []
+    for region in REGIONS:
+        part = displays.part(root, mark, region)
+        if part is None:
+            part = displays.add(root, mark, region, bpy.data.meshes.new(f"{title} {region}"))
+            displays.lock(part)
+        if part.data.get("mu_triangles") != len(triangles[region]):
+            skeletons.write(part.data, skeletons.Skeleton(vertices[region], faces=(triangles[region],)))
+            part.data["mu_triangles"] = len(triangles[region])
+        found.append(part)
+    return found
+
+
+def move(part: Any, vertices: Any) -> bool:
+    """Give a display's mesh other vertices (v, 3) in mm; return False if it has another number of them."""
+    if len(part.data.vertices) != len(vertices):
+        return False
+    part.data.attributes["position"].data.foreach_set("vector", np.ascontiguousarray(vertices).ravel())
+    part.data.update()
+    return True
