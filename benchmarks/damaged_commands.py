@@ -33,17 +33,16 @@ from pathlib import Path
 import numpy as np
 
 from benchmarks.table import ROOT, circumstances, options_of, print_head
+from mu_addon import design
 from mu_addon.cli import main as command_line
 from mu_addon.design.parameters import load_preset, to_toml
 from mu_addon.design.surface import stl_bytes
 from mu_addon.usecases.resume import MODULES
 from mu_addon.usecases.simulate_and_place import light
-from mu_addon.usecases.simulate_and_place import run as placing
-from mu_addon.usecases.simulate_and_place import study as placed_study
 from tests.design.printing import parts
 from tests.run.test_mutated_files import CORPUS, INDEX, RECORDING, mutated
 from tests.run.test_reading import MODEL
-from tests.usecases.fault_injection import PLACEMENT, ran, results
+from tests.usecases.fault_injection import PLACEMENT, ran, results, started
 
 ASSETS, DATA = ROOT / "assets", ROOT / "tests" / "data"
 COARSE = ["--refine", "0.35", "--times", "3", "--no-report"]
@@ -173,9 +172,9 @@ def holds_a_function(value):
 
 def placed_in(folder):
     """A finished `place` in a folder, computed by this process; what it finds by file."""
-    for module, name in ((placed_study, "build_solid"), (light, "fit_law"), (light, "traced_signal")):
+    for module, name in ((design, "build_solid"), (light, "fit_law"), (light, "traced_signal")):
         remembered(module, name)
-    status, messages = ran(lambda at, context: placing.USE_CASE.start(PLACEMENT, at, context), folder)
+    status, messages = ran(started(PLACEMENT), folder)
     assert status == 0, messages[-1]
     return held(folder)
 

@@ -27,14 +27,14 @@ from pathlib import Path
 import attrs
 import numpy as np
 import pytest
-from mu_addon.usecases.simulate_and_place.run import run_stages
-from mu_addon.usecases.simulate_and_place.study import Study
 
 from benchmarks.table import ROOT, circumstances, options_of, print_head
 from mu_addon.errors import MuError, OutputError
 from mu_addon.run.context import run_to_end
+from mu_addon.run.execution import Execution
 from mu_addon.run.folder import keep_inputs
 from mu_addon.run.progress import Progress
+from mu_addon.studies.use_case import begin_study
 from tests.headless.test_resume import JOB as COARSE
 from tests.run.failing_files import failing
 from tests.run.failing_memory import short_of_memory
@@ -193,7 +193,9 @@ def forked(folder):
     status = 70
     try:
         with run_to_end(Progress()) as context:
-            run_stages(Study.open(attrs.evolve(JOB[0], workers=1), folder, context))
+            job = attrs.evolve(JOB[0], workers=1)
+            begin_study(job, folder, context)
+            Execution(job, folder, context).run()
         status = context.status
     finally:
         os._exit(status)
@@ -236,7 +238,10 @@ def disk(work, reference):
         status, message = finish(mount / "study")
         subprocess.run(["mount", "-o", "remount,rw", mount], check=True)
         yield "the disk is read-only before it starts", f'exit {status}, "{message["what"]}"'
-        for pattern, what in (("cache/mesh-*", "after the mesh"), ("cache/sweep-*", "among the candidates")):
+        for pattern, what in (
+            ("cache/meshed-*", "after the mesh"),
+            ("cache/candidates-*", "among the candidates"),
+        ):
             folder = new(mount / what.split()[-1])
             process = start(folder)
             wait_for(process, folder, pattern)
@@ -249,7 +254,7 @@ def disk(work, reference):
             shutil.rmtree(folder)
         folder = new(mount / "again")
         process = start(folder)
-        wait_for(process, folder, "cache/state-*")
+        wait_for(process, folder, "cache/states-*")
         # Busy while a file is open for writing: tried until it is not.
         while subprocess.run(["mount", "-o", "remount,ro", mount], capture_output=True).returncode:
             time.sleep(0.005)

@@ -23,7 +23,6 @@ from mu_addon.design.parameters import Unit, load_preset
 from mu_addon.errors import MuError
 from mu_addon.fem.equilibrium import Equilibrium
 from mu_addon.meshing.settings import MeshSettings
-from mu_addon.studies.unit_inputs import grasp
 from mu_addon.studies.unit_ranking import UnitStudy
 
 STEP_KPA = -1.0
@@ -64,10 +63,10 @@ def main() -> None:
 def costs(unit: Unit, solid: bool, refine: float) -> list[str]:
     """Cells of a row of the table: unknowns, seconds, factorisations of the load step, gigabytes."""
     settings = MeshSettings(refine=refine)
-    job = UnitStudy(unit, grasp(), settings, stages=("design", "simulate"), mesh_check=False)
+    job = UnitStudy(unit=unit, mesh=settings, stages=("design", "simulate"), mesh_check=False)
     meshed, mesh = seconds(lambda: mesh_printed(unit, settings, solid=solid))
-    model = job.model(mesh, threads=1)
-    equilibrium = Equilibrium(model, job.materials(mesh), job.newton)
+    model = job.mechanics.model(mesh, threads=1)
+    equilibrium = Equilibrium(model, job.materials(mesh), job.mechanics.newton)
     assembled, values = seconds(lambda: equilibrium.rest_tangent)
     once, _ = seconds(lambda: model.factor.factor(values))
     factorised, _ = seconds(lambda: model.factor.factor(values))

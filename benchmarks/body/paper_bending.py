@@ -69,15 +69,15 @@ def main() -> None:
                 began = time.process_time()
                 try:
                     job = UnitStudy(
-                        load_preset(name).evolve(**SHAPES[shape]),
-                        protocol,
-                        MeshSettings(refine=options.refine),
+                        unit=load_preset(name).evolve(**SHAPES[shape]),
+                        protocol=protocol,
+                        mesh=MeshSettings(refine=options.refine),
                         times=len(protocol.pressure_kPa),
                         stages=("design", "simulate"),
                         self_contact=True,
                         mesh_check=False,
                     )
-                    angle = angles_deg(run_study(job, options.folder / folder)[1])
+                    angle = angles_deg(run_study(job, options.folder / folder))
                 except MuError as why:
                     print_row(*row, why.what, "", f"{time.process_time() - began:.0f}")
                     continue

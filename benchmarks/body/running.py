@@ -7,13 +7,13 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from mu_addon.usecases.simulate_and_place.run import simulate_and_place
-from mu_addon.usecases.simulate_and_place.study import Study, begin_study
 
 from mu_addon.fem.protocol import Protocol
 from mu_addon.run.context import RunContext
+from mu_addon.run.execution import Execution
 from mu_addon.run.progress import Progress
 from mu_addon.studies.unit_ranking import UnitStudy
+from mu_addon.studies.use_case import begin_study
 
 
 def outward(pressures_kPa: Sequence[float]) -> Protocol:
@@ -24,12 +24,12 @@ def outward(pressures_kPa: Sequence[float]) -> Protocol:
     return Protocol(np.arange(float(len(pressures))), np.array(pressures))
 
 
-def run_study(job: UnitStudy, folder: Path) -> tuple[Study, dict[str, Any]]:
-    """The study and its summary; a run that was stopped goes on in its folder. May raise MuError."""
+def run_study(job: UnitStudy, folder: Path) -> dict[str, Any]:
+    """The study's summary; a run that was stopped goes on in its folder. May raise MuError."""
     context = RunContext(Progress())
     begin_study(job, folder, context)
-    study = simulate_and_place(job, folder, context)
-    return study, context.summary
+    Execution(job, folder, context).run()
+    return context.summary
 
 
 def angles_deg(summary: dict[str, Any]) -> dict[float, float]:

@@ -45,17 +45,23 @@ def main() -> None:
             mesh = MeshSettings(refine=refine)
             touch = not options.without_contact
             job = UnitStudy(
-                unit, protocol, mesh, times=len(pressures), mesh_check=False, workers=1, self_contact=touch
+                unit=unit,
+                protocol=protocol,
+                mesh=mesh,
+                times=len(pressures),
+                mesh_check=False,
+                workers=1,
+                self_contact=touch,
             )
             folder = options.folder / f"{name}-{options.chambers}-{refine:g}{'' if touch else '-passing'}"
             try:
-                study, summary = run_study(job, folder)
+                summary = run_study(job, folder)
             except MuError as why:
                 print_row(name, f"{refine:g}", why)
                 continue
             angle = angles_deg(summary)
             J = summary["J_hat_mm"]
-            row = [name, f"{refine:g}", study.solver["unknowns"]]
+            row = [name, f"{refine:g}", summary["solver"]["unknowns"]]
             row += [f"{angle[p]:.3f}" for p in pressures if p]
             row += [", ".join(f"{n} {J[n]:.4f}" for n in sorted(J, key=J.get))]
             row += [f"{time.process_time() - began:.0f}"]

@@ -10,8 +10,8 @@ from collections.abc import Callable
 from importlib import import_module
 from typing import Any, NamedTuple
 
-# In the order in which --help lists them; a module's name is its command's, with _ for -, and a trailing _
-# for a keyword of Python.
+# In the order in which --help lists them, further studies after these; a module's name is its command's, with
+# _ for -, and a trailing _ for a keyword of Python.
 NAMES = (
     "presets",
     "design",
@@ -65,5 +65,8 @@ def _command(name: str) -> Command:
 
 
 def all_commands() -> dict[str, Command]:
-    """Every subcommand by its name."""
-    return {name.rstrip("_").replace("_", "-"): _command(name) for name in NAMES}
+    """Every subcommand by its name; a study without an example is none."""
+    from ..studies import STUDIES, study
+
+    found = {name.rstrip("_").replace("_", "-"): _command(name) for name in NAMES}
+    return found | {name: _command(name) for name in STUDIES if name not in found and study(name).example}

@@ -8,25 +8,16 @@ import attrs
 import numpy as np
 
 from ..measured.folder import LIKE_ABSOLUTE_kPa
-from ..measured.kinds import ACCURACIES, AXES, KINDS, MODES, PLATES, ROLES, VALVES
+from ..measured.kinds import ACCURACIES, AXES, BETWEEN, CHOICES, KINDS, MODES, ROLES, UP_TO
 from .facts import length_mm, section_mm, specimen
 from .proposal import Proposal
 
-_NUMBERS = (
-    *("temperature_C", "scale", "orientation_deg", "mass_g", "strut_mm", "chamber_volume_mm3", "gap_mm"),
-    *ACCURACIES,
-)
-_CHOICES = {
-    "plates": PLATES,
-    "axis": AXES,
-    "valve": VALVES,
-    "orientation_axis": AXES,
-    "mode": MODES,
-    "pressure": ("gauge", "absolute"),
-}
+_SIZES = ("section_mm", "length_mm")
+_NUMBERS = tuple(key for key in (*BETWEEN, *UP_TO, *ACCURACIES) if key not in _SIZES)
+_CHOICES = CHOICES | {"orientation_axis": AXES}
 # Keys that answer a question or change a conclusion, beside those on one column; others are mistakes.
 ANSWERS = (
-    *("kind", "section_mm", "length_mm", "interval_s", "zero", "sign", "specimen", "role", "cells"),
+    *("kind", *_SIZES, "interval_s", "zero", "sign", "specimen", "role", "cells"),
     *_CHOICES,
     *_NUMBERS,
 )

@@ -17,13 +17,12 @@ from ..run.inputs import digest
 from ..table_cells.own_tables import own_text
 from ..toml_reader import TomlTable, read_toml
 from .experiment import Array, Experiment
-from .kinds import ACCURACIES, AXES, KINDS, MODES, PLATES, ROLES, VALVES, Kind
+from .kinds import ACCURACIES, AXES, BETWEEN, CHOICES, KINDS, PRESSURES, ROLES, UP_TO, Kind
 from .table import Remark, read_table
 
 FILE = "experiments.toml"
 # Share of the largest strain by which strain and displacement over length may differ without a remark.
 ATMOSPHERE_kPa = 101.325
-PRESSURES = ("gauge", "absolute")
 # A unit under little vacuum, and at most at twice the atmosphere's pressure: soft walls bear no more.
 LIKE_ABSOLUTE_kPa = (90.0, 200.0)
 DISAGREE = 0.02
@@ -140,26 +139,14 @@ def _require_gauge_pressures(experiments: Sequence[Experiment], entries: Sequenc
         )
 
 
-# Bounds of the keys that are numbers; those above zero.
-_BETWEEN = {
-    "scale": (0.01, 100.0),
-    "orientation_deg": (-360.0, 360.0),
-    "run_order": (-1e15, 1e15),
-    "temperature_C": (-100.0, 300.0),
-    "gap_mm": (0.0, 1e3),
-    "added_mass_g": (0.0, 1e6),
-}
-_UP_TO = {"length_mm": 1e4, "strut_mm": 1e3, "mass_g": 1e6, "mass_sd_g": 1e6, "chamber_volume_mm3": 1e9}
-_CHOICES = {"mode": MODES, "plates": PLATES, "valve": VALVES, "axis": AXES}
-
-
 def _described(entry: TomlTable, kind: Kind) -> dict[str, Any]:
     """Checked values of the keys that are present."""
     fields: dict[str, Any] = {"name": entry.word("name"), "role": entry.word("role", ROLES)}
     fields |= {key: entry.word(key) for key in ("specimen", "session", "source") if key in entry}
-    fields |= {key: entry.number(key, *bounds) for key, bounds in _BETWEEN.items() if key in entry}
-    above = {key: entry.number(key, 0.0, most, above=True) for key, most in _UP_TO.items() if key in entry}
-    fields |= above | {key: entry.word(key, names) for key, names in _CHOICES.items() if key in entry}
+    fields |= {key: entry.number(key, *bounds) for key, bounds in BETWEEN.items() if key in entry}
+    above = {key: entry.number(key, 0.0, most, above=True) for key, most in UP_TO.items() if key in entry}
+    chosen = {key: entry.word(key, names) for key, names in CHOICES.items() if key in entry}
+    fields |= above | {key: word for key, word in chosen.items() if key != "pressure"}
     fields["accuracy"] = {
         column: entry.number(key, 0.0, 1e6, above=True) for key, column in ACCURACIES.items() if key in entry
     }

@@ -15,6 +15,7 @@ PLATES = ("hold", "slide")
 # Whether gauge and unit are shut off from the supply together.
 VALVES = ("open", "shut")
 ROLES = ("fit", "held_out")
+PRESSURES = ("gauge", "absolute")
 # Kinds that are of a unit, whose simulation predicts them.
 OF_A_UNIT = ("unit_pressure", "pressure_step", "unit_pose", "blocked_force")
 
@@ -76,6 +77,18 @@ ACCURACIES = {
     "pressure_accuracy_kPa": "pressure_kPa",
     "angle_accuracy_deg": "angle_deg",
 }
+
+# Keys that are numbers: lowest and highest value, or the highest of those above zero; and those of a choice.
+BETWEEN = {
+    "scale": (0.01, 100.0),
+    "orientation_deg": (-360.0, 360.0),
+    "run_order": (-1e15, 1e15),
+    "temperature_C": (-100.0, 300.0),
+    "gap_mm": (0.0, 1e3),
+    "added_mass_g": (0.0, 1e6),
+}
+UP_TO = {"length_mm": 1e4, "strut_mm": 1e3, "mass_g": 1e6, "mass_sd_g": 1e6, "chamber_volume_mm3": 1e9}
+CHOICES = {"plates": PLATES, "axis": AXES, "valve": VALVES, "mode": MODES, "pressure": PRESSURES}
 
 COMMON = (
     "name",

@@ -12,7 +12,6 @@ if TYPE_CHECKING:
     from .render import Camera as Camera
     from .render import Part as Part
     from .render import png as png
-    from .results import ReportData as ReportData
     from .vtk import write_mesh as write_mesh
     from .vtk import write_trajectory as write_trajectory
 else:

@@ -18,27 +18,6 @@ Floats = NDArray[np.floating[Any]]
 
 
 @attrs.frozen
-class Parameter:
-    """One row of the parameter table: value in `unit`, and its source or the reason why it was assumed."""
-
-    path: str
-    value: Any
-    unit: str = ""
-    source: str = ""
-    assumed: bool = False
-
-
-@attrs.frozen
-class Gate:
-    """A geometry check: the value found, the limit as text, and True if it passed."""
-
-    name: str
-    value: Any
-    limit: str
-    passed: bool
-
-
-@attrs.frozen
 class Path:
     """A candidate path: `length` consecutive anchors from P`start`, counted from 1 from the inlet on."""
 
@@ -54,7 +33,7 @@ class Path:
 
 @attrs.frozen(eq=False)
 class RankingResult:
-    """Result of a placement; solved paths in the order of `ReportData.solved_paths`."""
+    """Result of a placement; solved paths in the order of the candidates."""
 
     delta: Floats  # (paths, k times, j stations) mm
     j_hat: Floats  # (paths,) mm
@@ -76,18 +55,6 @@ class LatticePath:
     predicted_mm: float
     j_hat: float
     on_front: bool  # no solved path is both longer and less disturbing
-
-
-@attrs.frozen(eq=False)
-class LatticeSearch:
-    """Search over all paths of the lattice: the solved ones, best first, and the number of all.
-
-    risk: upper bound, 0 .. 1, of the probability that an unsolved path is better.
-    """
-
-    solved: Sequence[LatticePath]
-    paths: int
-    risk: float  # probability, at most, that an unsolved path is better
 
 
 STRETCH_COLUMNS = (
@@ -125,14 +92,6 @@ SELF_CONTACT_COLUMNS = (
     "z_mm",
 )
 """Columns of self_contact.csv: contact force with itself, least gap, and the peak's position at rest."""
-
-
-@attrs.frozen(eq=False)
-class PaintedStates:
-    """States painted by one field, on one scale up to `top`."""
-
-    pictures: Sequence[Picture]
-    top: float
 
 
 CONTACT_COLUMNS = (
@@ -259,58 +218,3 @@ class SideView:
     image: NDArray[np.uint8]
     extent: tuple[float, float, float, float]
     anchors: Floats  # (n, 2) y and z
-
-
-@attrs.frozen(eq=False)
-class ReportData:
-    """Everything that a report shows of one run; unfinished parts are empty and left out.
-
-    pressure_kPa and angle_deg (k,): of the converged states; protocol_s and protocol_kPa (n,): the pressure
-    protocol.
-    """
-
-    title: str
-    unit: str
-    status: str = "complete"  # or "partial"
-    reason: str = ""  # why it is partial
-    warnings: Sequence[str] = ()
-    view: SideView | None = None
-    pictures: Sequence[Picture] = ()
-    paths: Sequence[Path] = ()
-    ranking: RankingResult | None = None
-    left_out: str = ""  # by a quick ranking
-    estimated_mm: Mapping[str, float] = attrs.field(factory=dict)  # mean deviation before any path is solved
-    search: LatticeSearch | None = None
-    search_picture: Picture | None = None
-    light: Signals | None = None
-    contact: ContactHistory | None = None
-    stretch: Sequence[tuple[Any, ...]] = ()  # rows of STRETCH_COLUMNS
-    elongation_at_break: float = 0.0  # of the resin, as a ratio
-    stretched: PaintedStates | None = None
-    self_contact: Sequence[tuple[str, ...]] = ()  # rows of SELF_CONTACT_COLUMNS
-    self_friction: Mapping[str, float] | None = None  # coefficient, and lost_mJ over the protocol
-    touched: PaintedStates | None = None
-    effects: Sequence[str] = ()  # that measured data named and the simulation has, in words
-    pressure_kPa: Floats = attrs.field(factory=lambda: np.zeros(0))  # per converged state
-    angle_deg: Floats = attrs.field(factory=lambda: np.zeros(0))
-    protocol_s: Floats = attrs.field(factory=lambda: np.zeros(0))
-    protocol_kPa: Floats = attrs.field(factory=lambda: np.zeros(0))
-    in_time: bool = False
-    parameters: Sequence[Parameter] = ()
-    mesh: Mapping[str, Any] = attrs.field(factory=dict)  # label with unit -> figure
-    solver: Mapping[str, Any] = attrs.field(factory=dict)
-    gates: Sequence[Gate] = ()
-    seconds: Mapping[str, float] = attrs.field(factory=dict)
-    versions: Mapping[str, str] = attrs.field(factory=dict)
-    files: Mapping[str, str] = attrs.field(factory=dict)  # name in the run's folder -> its content
-
-    @property
-    def solved_paths(self) -> list[Path]:
-        """The paths without those of which the ranking knows only a lower bound."""
-        without = self.ranking.at_least_mm if self.ranking else {}
-        return [path for path in self.paths if path.name not in without]
-
-    @property
-    def is_partly_compared(self) -> bool:
-        """True if paths are not compared at some instants."""
-        return self.ranking is not None and bool(np.isnan(self.ranking.delta).any())

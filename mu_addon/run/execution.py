@@ -142,10 +142,12 @@ class Execution:
         def own(tasks: Iterable[Task]) -> list[Task]:
             return [task for task in tasks if task in mine or (task[0] in names and task in self._grew)]
 
-        def update(said: str = "") -> None:
+        def update(message: str = "") -> None:
             done = len(own(self._done))
             left = own([*self._waiting, *self._running.values()])
-            self.context.progress.update(done / max(self._expected(own(self.tasks)), done + len(left)), said)
+            self.context.progress.update(
+                done / max(self._expected(own(self.tasks)), done + len(left)), message
+            )
             if left and time.monotonic() - self._shown_s > KEEP_EVERY_S:
                 self.show()
 
@@ -248,14 +250,14 @@ class Execution:
 
         Returns a few words on the result.
         """
-        stage, said = self._stages[task[0]], ""
+        stage, message = self._stages[task[0]], ""
         try:
             if work is not None:
                 work()
                 self.results.catch_up(self.results.failed, self.results.members)
             if not self.results.is_kept(task):
                 self.results.value(task)
-            said = stage.says(self.results.value(task)) if stage.says is not SILENT else ""
+            message = stage.says(self.results.value(task)) if stage.says is not SILENT else ""
         except Dropped:
             self.results.failed[task] = ""
         except (OutputError, WorkerDiedError):
@@ -273,7 +275,7 @@ class Execution:
         if task[0] in self._growth:
             self._grow(task[0])
         self._begin_growth()
-        return said
+        return message
 
     def _begin_growth(self) -> None:
         """Begin the growth of the sets for which all is known that they take."""

@@ -1,40 +1,26 @@
-"""Every job, declared once: a file each, and a line in `STUDIES`."""
+"""Every job, declared once, a file each: `STUDIES` has the name of each, of its command, node and module."""
 
 from __future__ import annotations
 
 from functools import cache
 from importlib import import_module
 from keyword import iskeyword
+from pkgutil import iter_modules
 
 from ..run.study import Study
 
-STUDIES = {
-    "calibrate": "Calibrate",
-    "chain": "Chain",
-    "check": "Check",
-    "design": "UnitStudy",
-    "design-experiments": "DesignExperiments",
-    "diagnose": "Diagnose",
-    "export": "Export",
-    "fit-material": "FitMaterial",
-    "grip": "Grip",
-    "homogenize": "Homogenize",
-    "import": "Import",
-    "measure": "Measure",
-    "optimize": "Optimize",
-    "place": "UnitStudy",
-    "simulate": "UnitStudy",
-    "specimens": "Specimens",
-    "sweep": "Sweep",
-    "track": "Track",
-}
-"""Class by name of its command; its module has the same name, unless it has several commands."""
-_MODULES = dict.fromkeys(("design", "simulate", "place"), "unit_ranking")
+_OF_ALL = ("inputs", "unit_inputs", "unit_motion", "unit_ranking", "use_case")
+_OF_A_UNIT = {"design": "unit_ranking", "simulate": "unit_ranking", "place": "unit_ranking"}
+"""Module of a study of several commands, by each."""
+_FOUND = (m.name.rstrip("_").replace("_", "-") for m in iter_modules(__path__) if m.name not in _OF_ALL)
+STUDIES = tuple(sorted((*_OF_A_UNIT, *_FOUND)))
 
 
 @cache
 def study(name: str) -> type[Study]:
     """The study of a command."""
-    module = _MODULES.get(name, f"{name.replace('-', '_')}{'_' * iskeyword(name)}")
-    found: type[Study] = getattr(import_module(f".{module}", __name__), STUDIES[name])
+    own = f"{name.replace('-', '_')}{'_' * iskeyword(name)}"
+    module = import_module(f".{_OF_A_UNIT.get(name, own)}", __name__)
+    kinds = (one for one in vars(module).values() if isinstance(one, type) and issubclass(one, Study))
+    found: type[Study] = next(one for one in kinds if name in (getattr(one, "name", ""), *one.commands))
     return found

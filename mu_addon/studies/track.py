@@ -74,23 +74,24 @@ class Track(Study):
         metavar="CSV",
         required=True,
     )
-    fps: float = setting(
+    frame_rate: float = setting(
         described(
-            "fps",
+            "frame_rate",
             0.0,
             "frame rate in frames per second; empty: as given in FILE or in the clip",
             low=0.0,
             high=1e6,
         ),
         metavar="F",
+        option="fps",
     )
     followed: measured.Tracks | None = given(Input("followed"), default=None)
     """Markers that were followed already, in an open editor."""
 
     @derived
-    def setup(self, bench: measured.Bench, fps: float) -> measured.Bench:
+    def setup(self, bench: measured.Bench, frame_rate: float) -> measured.Bench:
         """The description with the frame rate that was asked for."""
-        return attrs.evolve(bench, fps=fps) if fps else bench
+        return attrs.evolve(bench, fps=frame_rate) if frame_rate else bench
 
     @stage("track", 10.0, kept=False)
     def experiment(

@@ -62,12 +62,12 @@ def before(study: UnitMotion, pressure_kPa: float) -> list[float]:
     return [*([0.0] if study.effects.has_gravity and pressure_kPa else []), *way][-3:]
 
 
-def told(state: fem.State) -> str:
+def state_message(state: fem.State) -> str:
     """A few words on a state."""
     return f"{state.pressure_kPa:.4g} kPa, residual {state.residual:.1e}, {state.iterations} iterations"
 
 
-@attrs.frozen(kw_only=True, eq=False)
+@attrs.frozen(kw_only=True, eq=False, slots=False)
 class UnitMotion(Study):
     """A unit's design and motion; see `UnitStudy`."""
 
@@ -94,17 +94,27 @@ class UnitMotion(Study):
     unit: design.Unit = given(UnitInput(target="design", modelled=False))
     quality: str = setting(QUALITY, target="design")
     body: design.Body | None = given(BodyInput(group=AROUND), default=None)
-    path: str = setting(
-        described(
-            "path", "", "also build the unit with a waveguide along this path: alpha1, ...; empty: none"
+    path: str = given(
+        Input(
+            "word",
+            (
+                described(
+                    "path",
+                    "",
+                    "also build the unit with a waveguide along this path: alpha1, ...; empty: none",
+                ),
+            ),
+            decides=False,
+            metavar="NAME",
+            target="design",
         ),
-        decides=False,
-        metavar="NAME",
-        target="design",
+        default="",
+        validator=attrs.validators.instance_of(str),
+        converter=lambda name: name or "",
     )
     protocol: fem.Protocol = given(ProtocolInput(), factory=grasp)
     mesh: meshing.MeshSettings = given(MeshInput(), factory=lambda: meshing.MeshSettings())
-    resin: str = given(
+    resin: str | None = given(
         OnceInput(
             descriptions=(
                 described(
@@ -120,7 +130,7 @@ class UnitMotion(Study):
             group=AROUND,
             target="simulate",
         ),
-        default="",
+        default=None,
     )
     effects: core.NamedEffects = given(EffectsInput(group=AROUND), factory=lambda: core.NamedEffects())
     obstacles: tuple[design.RigidBody, ...] = given(ObstaclesInput(group=AROUND), default=(), converter=tuple)
@@ -324,7 +334,7 @@ class UnitMotion(Study):
         ),
         wanted=_simulates_by_pressure,
         parallel=True,
-        says=told,
+        says=state_message,
     )
     def states(self, pressure_kPa: float, states: Members, equilibrium: fem.Equilibrium) -> fem.State:
         """The state at a pressure, from those before it on the same side of rest."""

@@ -37,7 +37,7 @@ from ..usecases.simulate_and_place.settings import (
 )
 from .inputs import OnceInput
 from .unit_inputs import OpticsInput
-from .unit_motion import SOLVER, UnitMotion, taking, told
+from .unit_motion import SOLVER, UnitMotion, state_message, taking
 
 LATTICE = "paths, and limits of --paths graph"
 COARSER = 0.7
@@ -93,7 +93,7 @@ def _best_in_time(study: UnitStudy, first_ranking: core.Ranking) -> Growth:
     yield first_ranking.best(PATHS_CHECKED)
 
 
-@attrs.frozen(kw_only=True, eq=False)
+@attrs.frozen(kw_only=True, eq=False, slots=False)
 class UnitStudy(UnitMotion):
     """A unit's printable solid, its motion without a sensor, and the ranking of sensor paths."""
 
@@ -123,7 +123,7 @@ class UnitStudy(UnitMotion):
         "paths.csv": "every path of the lattice: length, predicted and, where it was solved, exact deviation",
     }
 
-    quick: bool = given(OnceInput(descriptions=(QUICK,), target="place"), default=False)
+    quick: bool = given(OnceInput(descriptions=(QUICK,), target="place"), default=QUICK.default)
     stations: int = setting(STATIONS, metavar="J", group=SOLVER, target="place")
     mesh_check: bool = setting(MESH_CHECK, group=SOLVER, target="place")
     all_paths: bool = setting(ALL_PATHS, decides=False, group=SOLVER, target="place")
@@ -378,7 +378,7 @@ class UnitStudy(UnitMotion):
         wanted=_checks_by_pressure,
         failing="The mesh uncertainty is not known at {pressure_kPa:g} kPa: on the coarser mesh",
         parallel=True,
-        says=told,
+        says=state_message,
     )
     def coarse_states(self, pressure_kPa: float, coarse_equilibrium: fem.Equilibrium) -> fem.State:
         """The state at an extreme pressure, from rest."""
@@ -481,10 +481,8 @@ class UnitStudy(UnitMotion):
             ("path", "pressures_kPa"),
             lambda study: [],
             _way,
-            grows=lambda study, standing, uncertainty: core.solving(
-                study.compared, core.widened(study.contest, uncertainty), standing
-            ),
-            after=("standing", "uncertainty"),
+            grows=lambda study, *found: core.letting_in(study.compared, study.contest, *found),
+            after=("standing", "path_check", "uncertainty"),
         ),
         wanted=_checks_by_pressure,
         parallel=True,
@@ -514,10 +512,10 @@ class UnitStudy(UnitMotion):
         let_in: Members | None = None,
     ) -> core.Standing:
         """Where the candidates stand in the end."""
-        if not path_check.independent or let_in is None:
+        if let_in is None:
             return standing
         found: core.Standing = grown(
-            core.solving(compared, core.widened(contest, uncertainty), standing), let_in
+            core.letting_in(compared, contest, standing, path_check, uncertainty), let_in
         )
         return found
 
@@ -546,6 +544,11 @@ class UnitStudy(UnitMotion):
 
     # What is shown of the paths.
 
+    @intermediate()
+    def painter(self, meshed: meshing.Mesh, mechanics: core.Mechanics, states: Members) -> core.PathMotions:
+        """What gives fields of a mesh's states, for display."""
+        return core.PathMotions(mechanics, meshed, meshed, states)
+
     @stage(
         "motion of the paths",
         taking("motion of the paths"),
@@ -566,11 +569,6 @@ class UnitStudy(UnitMotion):
         if not path_check.independent or path in last_standing.at_least_mm:
             raise Dropped
         return painter.of(core.differences(path, {**candidates, **(let_in or {})}, last_standing))
-
-    @intermediate()
-    def painter(self, meshed: meshing.Mesh, mechanics: core.Mechanics, states: Members) -> core.PathMotions:
-        """What gives fields of a mesh's states, for display."""
-        return core.PathMotions(mechanics, meshed, meshed, states)
 
     @stage(
         "map",
@@ -723,7 +721,7 @@ class UnitStudy(UnitMotion):
 
     @section("ranking", "Ranking of the paths", order=-1)
     def estimated(self, estimates: Members, first_ranking: core.Ranking | None = None) -> Iterator[Part]:
-        """Estimates of the deviations, told at once, and shown as long as no path is solved."""
+        """Estimates of the deviations, state_message at once, and shown as long as no path is solved."""
         for found in estimates.values():
             yield recorded(core.ESTIMATED, found)
             words = core.words_on_estimates(found)

@@ -31,7 +31,7 @@ def coarse(folder, unit=UNIT, **changes):
     """Write the main job, small, into a folder, and return the command that runs it."""
     folder.mkdir(parents=True, exist_ok=True)
     small = {"mesh": MeshSettings(refine=0.35), "times": 4, "stations": 11}
-    write_study(UnitStudy(unit, MILD, **(small | changes)), folder)
+    write_study(UnitStudy(unit=unit, protocol=MILD, **(small | changes)), folder)
     return "resume", folder
 
 

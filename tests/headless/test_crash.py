@@ -31,7 +31,7 @@ def hit(folder, number, *more):
     keep_inputs(folder, SIMULATION.texts())
     words = command("resume", folder, "--no-report", *more)
     process = subprocess.Popen(words, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
-    while not list(folder.glob("cache/state-*")):
+    while not list(folder.glob("cache/states-*")):
         assert process.poll() is None
         time.sleep(0.002)
     os.kill(worker_of(folder), number)
@@ -78,7 +78,7 @@ def test_it_says_where_it_stood_and_resumes_to_the_same_digits(whole, tmp_path, 
     assert "interrupted" not in again.stderr
     for name in ("motion.csv", "stretch.csv"):
         assert (tmp_path / name).read_bytes() == (whole / name).read_bytes()
-    for path in whole.glob("cache/state-*"):
+    for path in whole.glob("cache/states-*"):
         with np.load(path) as a, np.load(tmp_path / "cache" / path.name) as b:
             assert all(np.array_equal(a[name], b[name]) for name in a.files)
 

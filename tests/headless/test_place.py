@@ -14,7 +14,6 @@ import numpy as np
 import pytest
 
 from mu_addon.design.anchors import anchor_points
-from mu_addon.placement.graph import Limits
 from mu_addon.usecases.simulate_and_place.settings import STAGES
 
 from ..report.browser import EXECUTABLE, Browser, complaints, requests
@@ -163,7 +162,9 @@ def test_the_report_of_a_real_run_opens_whole_in_a_browser(finished):
 def searched(tmp_path_factory, with_light):
     """A search of the whole lattice, with limits that leave few paths, after the same study's windows."""
     folder = with_light(tmp_path_factory.mktemp("search") / "out")
-    done = run(*quick_in(folder, paths="graph", limits=Limits(2.0, 2.0, 20.0)), "--no-report")
+    done = run(
+        *quick_in(folder, paths="graph", shortest_cells=2.0, longest_cells=2.0, bend_deg=20.0), "--no-report"
+    )
     assert done.returncode == 0, done.stderr
     return folder, done
 
@@ -209,7 +210,7 @@ def started(out):
 
 def wait_for_a_state_swept(process, out):
     deadline = time.monotonic() + PATIENCE_S
-    while not list((out / "cache").glob("sweep-*")) and time.monotonic() < deadline:
+    while not list((out / "cache").glob("candidates-*")) and time.monotonic() < deadline:
         assert process.poll() is None, "it ended before it could be stopped"
         time.sleep(0.05)
 

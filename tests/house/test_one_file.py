@@ -1,4 +1,4 @@
-"""A law, an effect and a lattice kind are each added by the one file shown in docs/engineering/extend.md."""
+"""Whatever docs/engineering/extend.md says is one file is added by the one that it shows."""
 
 import json
 import os
@@ -26,10 +26,13 @@ def copy(tmp_path_factory):
     for name, place in (
         ("gent.py", "mu_addon/fem/laws"),
         ("vacuum_gain.py", "mu_addon/evidence/effects"),
+        ("matlab.py", "mu_addon/lab_files/formats"),
         ("cross.toml", "assets/lattices"),
     ):
         text = re.search(rf"`{name}`:\n\n```\n(.*?)\n```\n", PAGE, re.DOTALL)[1]
         (folder / place / name).write_text(text, encoding="utf-8")
+    ring = re.search(r"## Add a study.*?```python\n(.*?)\n\n\ncontext = ", PAGE, re.DOTALL)[1]
+    (folder / "mu_addon/studies/ring.py").write_text(ring.replace("from mu_addon.", "from .."))
     (folder / "gent.toml").write_text(GENT)
     return folder
 
@@ -142,3 +145,33 @@ def test_a_lattice_kind_is_one_file(copy, tmp_path):
     shutil.rmtree(tmp_path)
     names = "('body-centred', 'body-centred-straight', 'cross', 'custom')"
     assert ran(copy, "-c", KIND) == f"{names} custom True 0.0545\n"
+
+
+FORMAT = """
+from pathlib import Path
+import numpy as np
+from scipy.io import savemat
+from mu_addon.lab_files import understand
+
+pull = 0.1 * np.arange(30)
+savemat("pull.mat", {"displacement_mm": pull, "force_N": 2.0 * pull})
+answers = {"kind": "coupon", "mode": "uniaxial", "section_mm": "12.5x3", "length_mm": "40"}
+(proposal,) = understand([Path("pull.mat")], answers).proposals
+print(abs(proposal.columns["force_N"] - 2.0 * pull).max())
+"""
+
+
+def test_a_format_is_one_file(copy):
+    assert float(ran(copy, "-c", FORMAT)) < 1e-12
+
+
+def test_a_study_is_one_file(copy):
+    """It has a command, a node, a report, and is resumed."""
+    line = ("headless/run.py", "ring", "--wall", "1.2", "--out", "ring")
+    assert "The ring has 1.24 mN/mm." in ran(copy, *line)
+    assert (copy / "ring" / "curve.csv").read_text().startswith("point,force_N\n1,")
+    assert "ring" in ran(copy, "headless/run.py", "--help")
+    shutil.rmtree(copy / "ring" / "cache")
+    assert "The ring has 1.24 mN/mm." in ran(copy, "headless/run.py", "resume", "ring")
+    nodes = "from mu_addon.usecases.graph.definitions import definitions as made"
+    assert ran(copy, "-c", f"{nodes}; print(made()['ring'].settings[0].name)") == "radius_mm\n"

@@ -45,6 +45,7 @@ OTHERWISE = {
     "optimization/unit_body.py": {"self_contact"},
     "placement/search.py": {"batch"},  # of paths
     "sensing/calibration.py": {"dark"},  # subtracted already
+    "studies/unit_motion.py": {"self_contact"},  # of a call, which may be quick
     "usecases/parameter_study/plan.py": {"protocol"},  # a file
     "usecases/parameter_study/point.py": {"memory_MB"},  # that a study took
     "usecases/graph/chain_nodes.py": {"protocol"},

@@ -8,20 +8,20 @@ import pytest
 
 from mu_addon.report import heatmaps, plots
 from mu_addon.report.results import Path
+from mu_addon.usecases.simulate_and_place.shown_ranking import result_of
 
-from .report_data import PATHS, results
+from .report_data import ANGLE, PATHS, PRESSURE, SECONDS, TIME, VIEW, ranking
 
-DATA = results()
-RANKING = DATA.ranking
+RANKING = result_of(ranking())
 CHARTS = {
-    "unit": lambda: plots.unit_with_paths(DATA.view, PATHS, "alpha4", [f"{j:.3f}" for j in RANKING.j_hat]),
-    "angle": lambda: plots.angle_against_pressure(DATA.pressure_kPa, DATA.angle_deg),
-    "protocol": lambda: plots.protocol(DATA.protocol_s, DATA.protocol_kPa),
+    "unit": lambda: plots.unit_with_paths(VIEW, PATHS, "alpha4", [f"{j:.3f}" for j in RANKING.j_hat]),
+    "angle": lambda: plots.angle_against_pressure(PRESSURE, ANGLE),
+    "protocol": lambda: plots.protocol(TIME, PRESSURE),
     "heatmap": lambda: heatmaps.heatmap(RANKING.delta[0], 1.0, True),
     "bar": lambda: heatmaps.color_bar(1.0),
     "marginal": lambda: plots.marginal(RANKING.delta.mean(axis=1), PATHS, "alpha4", "length"),
     "ranking": lambda: plots.ranking(RANKING, PATHS),
-    "seconds": lambda: plots.seconds(DATA.seconds),
+    "seconds": lambda: plots.seconds(SECONDS),
 }
 
 

@@ -234,7 +234,9 @@ JOBS: dict[str, Any] = {
     "check": Check(printer=load_printer(), unit=load_preset("mu-1.0x")),
     "grip": Grip(gripper=load_gripper("gripper")),
     "homogenize": Homogenize(unit=load_preset("mu-1.0x"), resin=ResinInput().made(("flexible-80a",), {})),
-    "place": UnitStudy(load_preset("mu-1.0x"), Protocol(np.arange(3.0), np.array([0.0, -20.0, 40.0]))),
+    "place": UnitStudy(
+        unit=load_preset("mu-1.0x"), protocol=Protocol(np.arange(3.0), np.array([0.0, -20.0, 40.0]))
+    ),
 }
 
 

@@ -2,6 +2,7 @@
 
 import functools
 
+import attrs
 import numpy as np
 import pytest
 
@@ -13,7 +14,6 @@ from mu_addon.fem.trajectory import Trajectory
 from mu_addon.meshing.settings import MeshSettings
 from mu_addon.run.context import run_to_end
 from mu_addon.run.progress import Progress
-from mu_addon.usecases.simulate_and_place.run import run_stages
 
 UNIT = load_preset("mu-1.0x").evolve(count=4)
 MESH = MeshSettings(refine=0.35)
@@ -75,16 +75,10 @@ class Waveguides:
 
 
 def place(folder, job):
-    """Run a study of a job in a folder whose motion, map and lattice's paths are made up."""
+    """Run a study in a folder, in this process; its motion, map and lattice's paths are made up."""
     from mu_addon.placement.sensitivity_map import Influence, loaded
+    from mu_addon.studies.use_case import use_case
     from mu_addon.usecases.simulate_and_place import graph_search
-    from mu_addon.usecases.simulate_and_place import study as study_module
-
-    def model_a(job, cache, model, samples, on_progress, on_reached=lambda state: None):
-        found = motion(model.mesh, *samples)
-        for one in found.solved:
-            on_reached(one)
-        return found, None
 
     def influence(model, materials, trajectory, monitor, pressures, sides):
         height = model.mesh.nodes[model.mesh.corners].mean(axis=1)[:, 2]
@@ -93,18 +87,25 @@ def place(folder, job):
         assert len(loaded(trajectory, pressures)) == len(pressures)
         return Influence(pressures, moved)
 
-    with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(study_module, "solve_model_a", model_a)
-        patch.setattr("mu_addon.usecases.simulate_and_place.candidate_pool.PrintedWaveguides", Waveguides)
-        patch.setattr(study_module, "estimated_J_mm", lambda *_: {"alpha1": 1.0})
+    def predicted(mechanics, motion, limits, stations):
+        _, chains = graph_search.chains_within(mechanics.unit, limits)
+        return graph_search.Predicted(0.1 + np.arange(len(chains)), ())
+
+    made_up = {
+        "candidates.PrintedWaveguides": Waveguides,
+        "graph_search.influence_map": influence,
+        "graph_search.predicted": predicted,
+        "graph_search.stable_part": lambda model, materials, motion, sides: motion,
+        "motion.state_after": lambda equilibrium, p, earlier: state(equilibrium.model.mesh, p / 1e3),
         # Seeking crossings in made-up states takes minutes.
-        patch.setattr(
-            "mu_addon.usecases.simulate_and_place.motion_checks.first_self_intersection", lambda *_: None
-        )
-        patch.setattr(graph_search, "_stable", lambda study, *_: study.trajectory)
-        patch.setattr(graph_search, "influence_map", influence)
-        patch.setattr(graph_search, "_predicted", lambda study, graph, chains: 0.1 + np.arange(len(chains)))
+        "motion_checks.first_self_intersection": lambda *_: None,
+        "place_stages.estimated_J_mm": lambda *_: {"alpha1": 1.0},
+    }
+    with pytest.MonkeyPatch.context() as patch:
+        for name, value in made_up.items():
+            patch.setattr(f"mu_addon.usecases.simulate_and_place.{name}", value)
         messages = []
         with run_to_end(Progress([messages.append])) as context:
-            run_stages(study_module.Study.open(job, folder, context))
+            context.wants_report = False
+            use_case("place").start(attrs.evolve(job, workers=1), folder, context)
         assert context.status == 0, messages[-1]

@@ -24,8 +24,6 @@ from mu_addon.usecases.parameter_study import point
 from mu_addon.usecases.parameter_study.plan import parse_plan
 from mu_addon.usecases.parameter_study.point import Task, run_point
 from mu_addon.usecases.sensor.stream import stream
-from mu_addon.usecases.simulate_and_place import analysis_mesh, study
-from mu_addon.usecases.simulate_and_place import run as placing
 
 from ..run.failing_files import failing
 from .fault_injection import (
@@ -34,13 +32,14 @@ from .fault_injection import (
     STUDY,
     Prepared,
     answered,
-    computed_once,
     faults,
     inject_each,
     lines_of,
+    made_once,
     placement,
     ran,
     rows_of,
+    simulation,
     unraisable,  # noqa: F401 - a fixture of every test here
 )
 
@@ -55,13 +54,8 @@ def for_good(request: pytest.FixtureRequest) -> bool:
 @pytest.mark.parametrize("step", [67, 3])
 def test_simulate(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, step: int) -> None:
     """Each 67th call, to be quick."""
-    monkeypatch.setattr(study, "build_solid", functools.cache(study.build_solid))
-    monkeypatch.setattr(analysis_mesh, "mesh_printed", computed_once(analysis_mesh.mesh_printed))
-
-    def run(folder: Path, context: RunContext) -> None:
-        placing.USE_CASE.start(STUDY, folder, context)
-
-    assert inject_each(run, tmp_path, failing, 5, PARTIAL, step=step) == []
+    made_once(monkeypatch)
+    assert inject_each(simulation(monkeypatch), tmp_path, failing, 5, PARTIAL, step=step) == []
 
 
 @pytest.mark.nightly("test_export")

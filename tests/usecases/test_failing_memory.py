@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import functools
 from contextlib import AbstractContextManager
 from pathlib import Path
 from typing import Any
@@ -18,8 +17,6 @@ from mu_addon.studies.use_case import use_case
 from mu_addon.usecases.parameter_study import point
 from mu_addon.usecases.parameter_study.plan import parse_plan
 from mu_addon.usecases.sensor.stream import stream
-from mu_addon.usecases.simulate_and_place import analysis_mesh, study
-from mu_addon.usecases.simulate_and_place import run as placing
 
 from ..run.failing_memory import FailingMemory, short_of_memory
 from .fault_injection import (
@@ -28,12 +25,12 @@ from .fault_injection import (
     STUDY,
     Prepared,
     answered,
-    computed_once,
     faults,
     inject_each,
     placement,
     ran,
     rows_of,
+    simulation,
     unraisable,  # noqa: F401 - a fixture of every test here
 )
 
@@ -52,13 +49,7 @@ def any_array(folder: Path, at: int, for_good: bool) -> AbstractContextManager[F
 @pytest.mark.parametrize("step", [43, 7])
 def test_simulate(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, step: int) -> None:
     """From the solid on; all is solved anew, each time."""
-    monkeypatch.setattr(study, "build_solid", functools.cache(study.build_solid))
-    monkeypatch.setattr(analysis_mesh, "mesh_printed", computed_once(analysis_mesh.mesh_printed))
-
-    def run(folder: Path, context: RunContext) -> None:
-        placing.USE_CASE.start(STUDY, folder, context)
-
-    assert inject_each(run, tmp_path, layer, MuError.status, PARTIAL, step=step) == []
+    assert inject_each(simulation(monkeypatch), tmp_path, layer, MuError.status, PARTIAL, step=step) == []
 
 
 @pytest.mark.nightly("test_export")

@@ -12,6 +12,7 @@ from mu_addon.errors import InputError
 from mu_addon.fem.protocol import Protocol
 from mu_addon.meshing.settings import MeshSettings
 from mu_addon.report.motion_files import read_motion
+from mu_addon.studies.unit_ranking import UnitStudy
 from mu_addon.usecases.live_bending import requests, run
 from mu_addon.usecases.live_bending.run import LiveBending
 from tests.design.kinds import cross, custom
@@ -30,7 +31,7 @@ def coarse(monkeypatch):
 
 def answered(bending, number, unit, kPa=8.0):
     """Pairs of kPa and degrees that answer a request, and its motion."""
-    requests.ask(bending.folder, number, Study(unit, PROTOCOL), kPa)
+    requests.ask(bending.folder, number, UnitStudy(unit=unit, protocol=PROTOCOL), kPa)
     assert bending.step()
     found = json.loads((bending.folder / requests.BENT).read_text())
     assert found["number"] == number
@@ -56,6 +57,7 @@ def test_a_wall_from_the_design_before_bends_as_one_meshed_anew(tmp_path):
     assert not warm.step(), "nothing more was asked for"
 
 
+@pytest.mark.nightly("test_a_wall_from_the_design_before_bends_as_one_meshed_anew")
 def test_a_lattice_of_another_kind_bends_too(tmp_path):
     """Its cell is meshed once: a thicker wall moves the mesh."""
     bending, unit = LiveBending(tmp_path), UNIT.evolve(**custom(cross()), seats=False)
@@ -97,7 +99,7 @@ def test_stretch_and_stress_come_after_the_shape_where_they_are_asked_for(tmp_pa
         told.append((len(motion.state_kPa), bool(motion.fields["lattice"])))
 
     monkeypatch.setattr(LiveBending, "_tell", tell)
-    requests.ask(tmp_path, 1, Study(UNIT, PROTOCOL), 8.0, fields=True)
+    requests.ask(tmp_path, 1, UnitStudy(unit=UNIT, protocol=PROTOCOL), 8.0, fields=True)
     assert bending.step()
     assert told == [(2, False), (2, True), (3, True)]
     motion = read_motion(tmp_path / json.loads((tmp_path / requests.BENT).read_text())["folder"])
@@ -114,10 +116,10 @@ def test_a_newer_request_ends_the_one_before(tmp_path, monkeypatch):
         write(self, found, error, finished)
         told.append(self._number)
         if len(told) == 1:
-            requests.ask(tmp_path, 2, Study(UNIT, PROTOCOL), 4.0)
+            requests.ask(tmp_path, 2, UnitStudy(unit=UNIT, protocol=PROTOCOL), 4.0)
 
     monkeypatch.setattr(LiveBending, "_tell", tell)
-    requests.ask(tmp_path, 1, Study(UNIT, PROTOCOL), 8.0)
+    requests.ask(tmp_path, 1, UnitStudy(unit=UNIT, protocol=PROTOCOL), 8.0)
     assert bending.step()
     assert told == [1], "one state, and no more"
     assert bending.step()
@@ -127,8 +129,8 @@ def test_a_newer_request_ends_the_one_before(tmp_path, monkeypatch):
 @pytest.mark.parametrize(
     ("study", "words"),
     [
-        (Study(UNIT, PROTOCOL, obstacles=[RigidBody(WALL)]), "obstacles"),
-        (Study(UNIT.evolve(law="prony"), PROTOCOL), "memory"),
+        (UnitStudy(unit=UNIT, protocol=PROTOCOL, obstacles=[RigidBody(WALL)]), "obstacles"),
+        (UnitStudy(unit=UNIT.evolve(law="prony"), protocol=PROTOCOL), "memory"),
     ],
 )
 def test_what_is_not_bent_live_is_refused(tmp_path, study, words):
@@ -138,7 +140,7 @@ def test_what_is_not_bent_live_is_refused(tmp_path, study, words):
 
 
 def test_a_unit_without_a_shape_is_told(tmp_path):
-    requests.ask(tmp_path, 1, Study(UNIT, PROTOCOL), 8.0)
+    requests.ask(tmp_path, 1, UnitStudy(unit=UNIT, protocol=PROTOCOL), 8.0)
     (tmp_path / requests.ASKED / "1" / "unit.toml").write_text("format = 1\nscale = -1.0\n")
     assert LiveBending(tmp_path).step()
     found = json.loads((tmp_path / requests.BENT).read_text())

@@ -1,19 +1,19 @@
 """The motion that a study keeps to be looked at: surfaces, states, sensor paths, point caches, pictures."""
 
+import io
+
 import attrs
 import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
-from mu_addon.usecases.simulate_and_place.candidates_by_pressure import CandidateSolver
 from PIL import Image
 from scipy.spatial import KDTree
 
 from mu_addon.design.anchors import anchor_points, windows
 from mu_addon.errors import InputError
 from mu_addon.fem.kinematics import probe
-from mu_addon.fem.protocol import Protocol
 from mu_addon.fem.state import State
 from mu_addon.fem.trajectory import whole_body
 from mu_addon.fem.unit_materials import materials_of
@@ -30,57 +30,46 @@ from mu_addon.report.motion_files import (
     read_motion,
     surface_of,
     write_model_a,
+    write_path,
     write_sensitivity,
 )
 from mu_addon.report.pc2 import read_pc2, write_pc2
-from mu_addon.run.cache import Cache
-from mu_addon.studies.unit_ranking import UnitStudy
-from mu_addon.usecases.simulate_and_place.charts import ANGLE, delta_name, write_angle, write_delta
-from mu_addon.usecases.simulate_and_place.path_motion import keep_motion
+from mu_addon.usecases.simulate_and_place.candidates import solved
+from mu_addon.usecases.simulate_and_place.charts import angle_picture, delta_picture
+from mu_addon.usecases.simulate_and_place.mechanics import Mechanics
+from mu_addon.usecases.simulate_and_place.path_motion import PathMotions
 
 from . import made_up
 from .made_up import UNIT, Waveguides
 
 PRESSURES = np.array([0.0, -10.0, 0.0, 10.0, 20.0])
 TIMES = np.arange(5.0)
-JOB = UnitStudy(
-    unit=UNIT,
-    protocol=Protocol(TIMES, PRESSURES),
-    mesh=made_up.MESH,
-    times=5,
-    stations=21,
-    workers=1,
-)
-PATHS = candidate_paths(anchor_points(UNIT), windows(4))
-
-
-@pytest.fixture(autouse=True, scope="module")
-def waveguides():
-    """Sensors by formulas, in the place of those that are solved for."""
-    with pytest.MonkeyPatch.context() as patch:
-        patch.setattr("mu_addon.usecases.simulate_and_place.candidate_pool.PrintedWaveguides", Waveguides)
-        yield
+ANCHORS = anchor_points(UNIT)
+PATHS = candidate_paths(ANCHORS, windows(4))
 
 
 @pytest.fixture(scope="module")
 def study(tmp_path_factory):
-    """A folder with a coarse unit's motion, its mesh and trajectory, and the sweep of its paths."""
+    """A folder with a coarse unit's motion, its mesh and trajectory, and what its paths were solved at."""
     folder = tmp_path_factory.mktemp("study")
     mesh = made_up.mesh()
     trajectory = made_up.motion(mesh, TIMES, PRESSURES)
     write_model_a(folder, mesh, materials_of(UNIT, mesh), trajectory)
     write_sensitivity(folder, mesh, mesh.nodes[mesh.corners].mean(axis=1)[:, 2])
-    sweep, evaluations = swept(folder, mesh, mesh, trajectory, PATHS)
-    return folder, mesh, trajectory, sweep, evaluations
+    return folder, mesh, trajectory, shown(folder, mesh, trajectory, PATHS)
 
 
-def swept(folder, mesh, solved_on, trajectory, jobs):
-    """The sweep of some jobs on a mesh, the motion of its paths written, and its evaluations."""
-    sweep = CandidateSolver(JOB, Cache(folder / "cache"), solved_on, jobs, PRESSURES, whole=True)
-    evaluations = sweep.evaluations(trajectory, lambda _: None)
-    sweep.close()
-    keep_motion(JOB, folder, mesh, solved_on, trajectory, sweep, jobs, lambda share: None)
-    return sweep, evaluations
+def shown(folder, own, trajectory, paths, sensors=Waveguides):
+    """Write the motion of some paths that are solved on a trajectory's mesh; return their solutions."""
+    states = {round(s.pressure_kPa, 9): s for s in trajectory.solved}
+    painter = PathMotions(Mechanics(UNIT), own, trajectory.mesh, states)
+    found = []
+    for number, path in enumerate(paths):
+        one = solved(sensors(UNIT, trajectory.mesh, (), ANCHORS), number, [-10.0, 10.0, 20.0], states, 21)
+        moved = painter.of(dict(zip(one.pressure_kPa, one.difference_mm, strict=True)))
+        write_path(folder, path.name, moved.pressure_kPa, moved.difference_mm, **moved.fields)
+        found.append(one)
+    return found
 
 
 @pytest.fixture(scope="module")
@@ -134,17 +123,13 @@ def test_a_whole_mesh_cannot_be_cut_open(study, tmp_path):
 
 
 def test_a_paths_motion_is_what_its_deviation_was_found_from(study, motion):
-    _, mesh, trajectory, sweep, _ = study
+    _, mesh, trajectory, found = study
     assert motion.paths == tuple(c.name for c in PATHS)
-    monitor = probe(mesh, anchor_points(UNIT))
-    name = motion.paths[-1]
-    job = next(i for i, c in enumerate(PATHS) if c.name == name)
+    monitor, name, own = probe(mesh, ANCHORS), motion.paths[-1], found[-1]
     moved = motion.displacement(name)
-    for number, state in enumerate(trajectory.solved):
-        if round(state.pressure_MPa * 1e3, 9) not in np.round(sweep.solved_kPa, 9):
-            continue
-        kept = sweep._cache.get("sweep", sweep._name(state.pressure_MPa, job))["moved_mm"]
-        assert np.allclose(anchor_points(UNIT) + monitor.displacement(moved[number]), kept, atol=1e-5)
+    for kPa, anchors in zip(own.pressure_kPa, own.anchors, strict=True):
+        number = [round(s.pressure_kPa, 9) for s in trajectory.solved].index(kPa)
+        assert np.allclose(ANCHORS + monitor.displacement(moved[number]), anchors, atol=1e-5)
         apart = np.linalg.norm(moved[number] - motion.model_a[number], axis=1)
         assert apart.max() > 1e-3
     with pytest.raises(InputError, match="no motion of alpha99"):
@@ -172,23 +157,22 @@ class OneSided(Waveguides):
         return [State(s.pressure_MPa, s.u * (1.0 - 0.01 * self.mesh.nodes[:, :1]))]
 
 
-def test_a_path_off_the_mirror_plane_moves_both_sides_apart(study, tmp_path, monkeypatch):
+def test_a_path_off_the_mirror_plane_moves_both_sides_apart(study, tmp_path):
     """Solved on the whole body, shown by its half and the half's image: both are where the whole body is."""
-    monkeypatch.setattr("mu_addon.usecases.simulate_and_place.candidate_pool.PrintedWaveguides", OneSided)
     _, mesh, trajectory, *_ = study
     whole, there = whole_body(mesh, trajectory)
-    aside = Candidate("aside", 0, anchor_points(UNIT)[:4] + np.array([0.9 * UNIT.dimensions.cell, 0.0, 0.0]))
+    aside = Candidate("aside", 0, ANCHORS[:4] + np.array([0.9 * UNIT.dimensions.cell, 0.0, 0.0]))
     write_model_a(tmp_path, mesh, materials_of(UNIT, mesh), trajectory)
-    sweep, _ = swept(tmp_path, mesh, whole, there, [aside])
+    (one,) = shown(tmp_path, mesh, there, [aside], OneSided)
     found = read_motion(tmp_path)
-    ((_, pressure_kPa, difference_mm),) = sweep.whole(there)
-    number = int(np.argmax(np.abs(pressure_kPa)))
-    state = int(np.flatnonzero(found.state_kPa == pressure_kPa[number])[0])
+    number = int(np.argmax(np.abs(one.pressure_kPa)))
+    difference_mm = one.difference_mm
+    state = int(np.flatnonzero(found.state_kPa == one.pressure_kPa[number])[0])
     moved = whole.nodes + there.solved[state].u + difference_mm[number]
     skin = found.skin("lattice", False)
-    shown = skin.of_nodes(mesh.nodes) + skin.of_nodes(*found.sides("aside"))[state]
+    at = skin.of_nodes(mesh.nodes) + skin.of_nodes(*found.sides("aside"))[state]
     _, nearest = KDTree(whole.nodes).query(skin.of_nodes(mesh.nodes))
-    assert np.allclose(shown, moved[nearest], atol=1e-4)
+    assert np.allclose(at, moved[nearest], atol=1e-4)
     own, image = found.sides("aside")
     assert np.abs(own[state] - image[state]).max() > 1e-3, "not a mirror image of itself"
     stress = found.field("aside", "lattice", "von_mises_kPa", skin)[state]
@@ -275,14 +259,11 @@ def test_point_caches_come_back(tmp_path_factory, positions):
         read_pc2(path)
 
 
-def test_pictures_for_a_panel_are_small_and_square(study):
-    folder, _, trajectory, _, evaluations = study
-    write_angle(folder, np.unique(PRESSURES), np.array([-3.0, 0.0, 2.0, 5.0]))
-    found = evaluations[-1]
-    write_delta(folder, found.name, found.deviation.delta, trajectory.time_s, found.deviation.delta.max())
-    for name in (ANGLE, delta_name(found.name)):
-        path = folder / "motion" / name
-        with Image.open(path) as image:
+def test_pictures_for_a_panel_are_small_and_square():
+    angle = angle_picture(np.unique(PRESSURES), np.array([-3.0, 0.0, 2.0, 5.0]))
+    delta = np.outer(np.abs(PRESSURES), np.linspace(0.0, 0.05, 21))
+    for picture in (angle, delta_picture("alpha3", delta, TIMES, delta.max())):
+        with Image.open(io.BytesIO(picture.png)) as image:
             assert image.size[0] == image.size[1] <= 600
             assert len(image.convert("RGB").getcolors(10**6)) > 50
-        assert path.stat().st_size < 100_000
+        assert len(picture.png) < 100_000

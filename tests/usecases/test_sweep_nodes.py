@@ -85,8 +85,8 @@ def test_how_many_studies_at_a_time_decides_no_key_and_a_step_more_does():
 @pytest.mark.parametrize(
     ("settings", "words"),
     [
-        ({"low": 1.0, "high": 0.8}, "not below"),
-        ({"low": -1.0, "log": True}, "no logarithm"),
+        ({"low": 1.0, "high": 0.8}, "are not a range"),
+        ({"low": -1.0, "log": True}, "log = True with low"),
         ({"values": "0.8 thick"}, "not values"),
         ({"parameter": "chambers.count", "low": 2.5, "high": 4.0}, "not a whole number"),
     ],

@@ -1,20 +1,18 @@
-"""Formats of laboratory files, one module each.
+"""Formats of laboratory files, one module each: `FORMATS` has every module's `read`.
 
-A format is a function `read` from a file's content to its sheets, None where the content is of another one.
+It makes sheets of a file's content, None where the content is of another format. Those that read any text say
+so by `TEXT`, and are asked after those that know their content by its bytes; the larger it is, the later.
 """
 
 from __future__ import annotations
 
 from collections.abc import Callable
+from importlib import import_module
+from pkgutil import iter_modules
 
 from ..sheet import Content, Sheet
-from . import labview, markup, serial_log, text_table, workbook
 
-# The first that reads a content decides; any text is a table.
-FORMATS: tuple[Callable[[Content], tuple[Sheet, ...] | None], ...] = (
-    workbook.read,
-    markup.read,
-    labview.read,
-    serial_log.read,
-    text_table.read,
+_MODULES = [import_module(f".{m.name}", __name__) for m in iter_modules(__path__)]
+FORMATS: tuple[Callable[[Content], tuple[Sheet, ...] | None], ...] = tuple(
+    module.read for module in sorted(_MODULES, key=lambda module: getattr(module, "TEXT", 0))
 )

@@ -12,6 +12,7 @@ from ..columns import column, is_unit
 from ..sheet import Content, Sheet
 from . import text_table
 
+TEXT = 1
 _MAGIC, _TITLES = "LabVIEW Measurement", "X_Value"
 
 

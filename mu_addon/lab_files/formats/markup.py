@@ -8,6 +8,7 @@ from ...errors import InputError
 from ...table_cells.dialect import Row
 from ..sheet import Content, Sheet
 
+TEXT = 1
 _ROWS, _CELLS, _TABLES = ("tr", "row", "ss:row"), ("td", "th", "cell", "ss:cell"), ("table", "worksheet")
 
 

@@ -9,6 +9,7 @@ from ...table_cells.dialect import Row, delimiter_of, is_reading, lines_of, spli
 from ..sheet import Content, Sheet
 
 # The Arduino IDE writes an arrow behind the clock, terminal programs brackets around it.
+TEXT = 1
 _CLOCK = r"((?:\d{4}-\d\d-\d\d[ T])?\d{1,2}:\d\d:\d\d(?:[.,]\d+)?)"
 _ARROW = re.compile(rf"\s*(?:{_CLOCK}\s*->|\[{_CLOCK}\])\s*(.*)")
 _PAIR = re.compile(

@@ -5,6 +5,8 @@ from __future__ import annotations
 from ...table_cells.dialect import rows_of
 from ..sheet import Content, Sheet
 
+TEXT = 2
+
 
 def read(content: Content) -> tuple[Sheet, ...]:
     """The one sheet of any text."""

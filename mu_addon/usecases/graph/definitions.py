@@ -6,11 +6,13 @@ from functools import cache
 from types import MappingProxyType
 
 from ...graph.definition import Definition, Definitions
+from ...studies import STUDIES, study
 from .bench_nodes import bench_nodes
 from .chain_nodes import chain_nodes
 from .design_nodes import design_nodes
 from .evidence_nodes import evidence_nodes
 from .optimize_nodes import optimize_nodes
+from .studies import node_of
 from .study_nodes import study_nodes
 from .sweep_nodes import sweep_nodes
 
@@ -24,4 +26,5 @@ def definitions() -> Definitions:
     )  # fmt: skip
     for made in makers:
         found |= {definition.kind: definition for definition in made()}
+    found |= {name: node_of(name) for name in STUDIES if name not in found and study(name).node}
     return MappingProxyType(found)

@@ -32,29 +32,21 @@ def _varied() -> dict[str, bool]:
 
 def _range(call: Call) -> Outputs:
     """A range as a line of [vary] in sweep.toml: its name and its table."""
+    from ...toml_reader import TomlTable
+    from ..parameter_study.variable import variable
+
     s = call.settings
-    whole = _varied()[s["parameter"]]
+    name, whole = s["parameter"], _varied()[s["parameter"]]
     if s["values"].strip():
         try:
             found = [float(word) for word in s["values"].split()]
         except ValueError:
-            raise InputError(
-                f"{s['values']!r} are not values", "values", "give numbers, such as 0.8 0.9 1.0"
-            ) from None
-        return {"range": (s["parameter"], {"values": [_number(v, whole) for v in found]})}
-    if not s["low"] < s["high"]:
-        raise InputError(
-            f"low = {s['low']:g} is not below high = {s['high']:g}", "low, high", "give low < high, or values"
-        )
-    if s["log"] and s["low"] <= 0.0:
-        raise InputError(f"low = {s['low']:g} has no logarithm", "low, log", "give a positive low")
-    table = {
-        "low": _number(s["low"], whole),
-        "high": _number(s["high"], whole),
-        "log": s["log"],
-        "steps": s["steps"],
-    }
-    return {"range": (s["parameter"], table)}
+            what = f"{s['values']!r} are not values"
+            raise InputError(what, "values", "give numbers, such as 0.8 0.9 1.0") from None
+        return {"range": (name, {"values": [_number(v, whole) for v in found]})}
+    table = {key: _number(s[key], whole) for key in ("low", "high")} | {k: s[k] for k in ("log", "steps")}
+    variable(name, TomlTable(table))
+    return {"range": (name, table)}
 
 
 def _number(value: float, whole: bool) -> float | int:

@@ -6,7 +6,6 @@ import csv
 import math
 from collections.abc import Mapping
 from pathlib import Path
-from typing import Any
 
 import attrs
 
@@ -15,12 +14,10 @@ from ...graph.definition import Call, Outputs
 from ...graph.evaluation import Finished, Order
 from ...reading import text_in
 from ...studies.sweep import LAST, TABLE, Sweep
-from ...studies.unit_inputs import protocol_of
-from ...studies.unit_ranking import UnitStudy
 from ...studies.use_case import use_case
 from ...toml_reader import TomlTable
-from ..parameter_study.plan import Plan
-from ..parameter_study.variable import Inputs, changed_inputs, variable
+from ..parameter_study.plan import Plan, planned
+from ..parameter_study.variable import changed_inputs
 from ..simulate_and_place.settings import STAGES
 from .parts import Design, refuse_body
 from .sweep_nodes import GOALS
@@ -59,15 +56,6 @@ def _plan_of(call: Call) -> Plan:
     """The plan of a node Parameter Study. Raises InputError."""
     s, design = call.settings, call.inputs["unit"]
     refuse_body(design, "a parameter study")
-    protocol = protocol_of(s["protocol"] or None)
-    tables: dict[str, dict[str, Any]] = {
-        "design": {},
-        "simulate": {"times": s["times"], "mesh": {"refine": s["refine"]}}
-        | ({"self_contact": True} if s["self_contact"] else {})
-        | ({"self_friction": s["self_friction"]} if s["self_friction"] else {}),
-        "place": {},
-    }
-    tables = {stage: tables[stage] for stage in STAGES[: STAGES.index(s["stages"]) + 1]}
     ranges = [given for _, given in call.inputs["ranges"]]
     names = [name for name, _ in ranges]
     twice = [name for name in names if names.count(name) > 1]
@@ -77,21 +65,20 @@ def _plan_of(call: Call) -> Plan:
             "ranges",
             "leave one of them out, or vary another parameter",
         )
-    variables = tuple(variable(name, TomlTable(table, call.node)) for name, table in ranges)
-    # A setting that is wrong for every point is reported before any work.
-    UnitStudy.of_tables(tables, Path(call.node), unit=design.unit, protocol=protocol, workers=1)
-    return Plan(
-        inputs=Inputs(design.unit, protocol, tables),
-        variables=variables,
-        folder=_NOWHERE,
-        method=s["method"],
-        count=s["points"],
-        seed=s["seed"],
-        memory_MB=s["memory_MB"],
-        minutes=s["minutes"],
-        minimize=tuple(s["minimize"].split()),
-        maximize=tuple(s["maximize"].split()),
-    )
+    simulate = {
+        "times": s["times"],
+        "mesh": {"refine": s["refine"]},
+        **({"self_contact": True} if s["self_contact"] else {}),
+        **({"self_friction": s["self_friction"]} if s["self_friction"] else {}),
+    }
+    plain = ("stages", "method", "points", "seed", "memory_MB", "minutes", "protocol")
+    keys = {
+        **{name: s[name] for name in plain},
+        **{name: s[name].split() for name in ("minimize", "maximize")},
+        **({"simulate": simulate} if s["stages"] != STAGES[0] else {}),
+        "vary": dict(ranges),
+    }
+    return planned(TomlTable(keys, call.node), lambda file: design.unit, _NOWHERE)
 
 
 def sweep_order(call: Call) -> Order:

@@ -85,7 +85,7 @@ class _Drawn:
     @cached_property
     def morph(self) -> PrintedMorph:
         """Morph that adapts the mesh to another design."""
-        return PrintedMorph(self.mesh, self.study.unit, self.study.mesh_settings(self.study.mesh))
+        return PrintedMorph(self.mesh, self.study.unit, self.study.meshed_as)
 
 
 @attrs.frozen(eq=False, slots=False)

@@ -149,7 +149,8 @@ class Plan:
         try:
             changed = changed_inputs(self.inputs, values, self.folder)
             given = {"unit": changed.unit, "protocol": changed.protocol, "workers": 1}
-            job = UnitStudy.of_tables(changed.tables, Path("[vary]"), **given)
+            tables = {name: TomlTable(table, "[vary]", name=name) for name, table in changed.tables.items()}
+            job = UnitStudy.of_tables(tables, Path("[vary]"), **given)
             return Point(number, values, job)
         except MuError as error:
             return Point(number, values, None, error)

@@ -49,6 +49,7 @@ if TYPE_CHECKING:
     from .place_stages import checked_paths as checked_paths
     from .place_stages import differences as differences
     from .place_stages import estimates as estimates
+    from .place_stages import letting_in as letting_in
     from .place_stages import lit as lit
     from .place_stages import marched as marched
     from .place_stages import motion_of_best as motion_of_best
@@ -58,7 +59,6 @@ if TYPE_CHECKING:
     from .place_stages import sweep_figures as sweep_figures
     from .place_stages import uncertainty as uncertainty
     from .place_stages import whole_motion as whole_motion
-    from .place_stages import widened as widened
     from .place_stages import words_on_estimates as words_on_estimates
     from .place_stages import words_on_solved as words_on_solved
     from .ranking import Ranking as Ranking

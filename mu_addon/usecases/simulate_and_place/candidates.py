@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Generator, Mapping, Sequence
+from copy import deepcopy
 from typing import Any
 
 import attrs
@@ -216,7 +217,9 @@ def solving(compared: Comparison, contest: Contest | None, before: Standing | No
     its best; None: all alike. before: what is solved already. A pressure that a candidate
     misses is compared for none, and neither are those beyond it. Raises ConvergenceError where none is left.
     """
-    known = Standing() if before is None else attrs.evolve(before, not_reached=[], ended=[], at_least_mm={})
+    # What is added must not change the standing that a check of paths was taken from.
+    known = Standing() if before is None else deepcopy(before)
+    known.not_reached, known.ended, known.at_least_mm = [], [], {}
     known.compared_kPa = list(compared.samples.distinct_kPa)
     few = len(compared.loaded_kPa) <= FEW_PRESSURES
     while True:

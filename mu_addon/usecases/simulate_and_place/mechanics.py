@@ -38,12 +38,12 @@ class Mechanics:
     """A unit with all that acts on it but its pressure: body, obstacles, effects, contact with itself."""
 
     unit: Unit
-    body: Body | None = None
-    obstacles: tuple[RigidBody, ...] = ()
-    effects: NamedEffects = attrs.field(factory=NamedEffects)
-    self_contact: bool = False
-    self_friction: float = 0.0
-    device: str = "cpu"
+    body: Body | None
+    obstacles: tuple[RigidBody, ...]
+    effects: NamedEffects
+    self_contact: bool
+    self_friction: float
+    device: str
 
     def hash(self) -> str:
         """Hash of what decides a motion: neither the unit's name nor its waveguide, and not the device."""

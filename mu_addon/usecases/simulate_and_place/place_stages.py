@@ -27,10 +27,12 @@ from .candidates import (
     Comparison,
     PathCheck,
     Solved,
+    Solving,
     Standing,
     deviation_alone,
     evaluated,
     evaluated_in_time,
+    solving,
     waveguides_of,
 )
 from .graph_search import Predicted, chains_within, checking, is_printable, lattice_paths
@@ -194,9 +196,17 @@ def uncertainty(
         return Uncertainty(None, f"The mesh uncertainty is not known: on the coarser mesh, {error.what}.")
 
 
-def widened(contest: Contest, found: Uncertainty) -> Contest:
-    """The contest with all paths that the mesh uncertainty does not tell from the best."""
-    return attrs.evolve(contest, margin_mm=found.value_mm or 0.0)
+def letting_in(
+    compared: Comparison, contest: Contest, standing: Standing, check: PathCheck, found: Uncertainty
+) -> Solving:
+    """Solve on all paths that the mesh uncertainty does not tell from the best, see `solving`.
+
+    Where candidates were followed from rest, each is known already.
+    """
+    if not check.independent:
+        return standing
+    wider = attrs.evolve(contest, margin_mm=found.value_mm or 0.0)
+    return (yield from solving(compared, wider, standing))
 
 
 # Light.

@@ -52,7 +52,7 @@ def test_a_folder_is_checked_as_it_is_chosen(blocks):
     assert "Choose a folder with experiments.toml" in drawn()
     assert not bpy.ops.mu.evidence_diagnose.poll()
     root.mu_evidence.folder = str(data / "none")
-    assert "cannot read experiments.toml" in drawn()
+    assert "cannot read the experiments" in drawn()
     assert not bpy.ops.mu.evidence_diagnose.poll()
     root.mu_evidence.folder = str(data)
     assert "0.75x: 4 rows" in drawn()
