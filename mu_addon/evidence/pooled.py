@@ -102,7 +102,7 @@ def pooled_effects(effects: Sequence[Effect], experiments: Sequence[Experiment])
     differ in their protocol, and separate leaks or drifts would imitate another law of the same unit.
     """
     found = []
-    for effect in (*effects, *of_specimens(experiments)):
+    for effect in (*of_specimens(experiments), *effects):
         size, *shape = effect.parameters
         if DECLARED[effect.name].of == ALL:
             continue
@@ -157,7 +157,8 @@ def fits_among(
         one = _fitted(fitter, base, effect)
         if one is not None:
             found.append(one)
-    return sorted(found, key=lambda one: -one[0])
+    # Of those that do equally well but for rounding the first is taken: specimens differ always.
+    return sorted(found, key=lambda one: -round(one[0], 6))
 
 
 def _fitted(fitter: Fitter, base: Fit, effect: Effect) -> tuple[float, Fit] | None:

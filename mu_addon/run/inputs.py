@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import hashlib
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -21,14 +21,18 @@ def digest(content: str | bytes) -> str:
     return hashlib.sha256(content.encode() if isinstance(content, str) else content).hexdigest()
 
 
+INPUTS = "inputs", "choose another folder"
+"""What such a file is, and what to do where it cannot be read."""
+
+
 def read_inputs(
-    path: Path, what: str = "inputs", remedy: str = "choose another folder", version: int = FORMAT
+    path: Path, words: Sequence[str] = INPUTS, version: int = FORMAT
 ) -> tuple[TomlTable, dict[str, Any]]:
     """Inputs of a file, and its table `[run]` of keys that decide no result. Raises InputError.
 
-    what, remedy: of a file that cannot be read; version: the format's number.
+    words: what the file is, and what to do where it cannot be read; version: the format's number.
     """
-    document = read_toml(path, what, remedy)
+    document = read_toml(path, *words)
     found = document.values.get("format")
     newer = isinstance(found, int) and not isinstance(found, bool) and found > version
     words = "use the newer version that wrote it" if newer else "start it again in another folder"

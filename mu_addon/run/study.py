@@ -36,7 +36,7 @@ from ..errors import InputError
 from ..reading import file_bytes, parse_toml
 from ..toml_reader import TomlTable
 from .folder import RUN, FolderLayout
-from .inputs import FORMAT, digest, read_inputs
+from .inputs import FORMAT, INPUTS, digest, read_inputs
 
 if TYPE_CHECKING:
     from .progress import Progress
@@ -622,7 +622,7 @@ class Study:
 
         words: as those of `read_inputs`. Raises InputError.
         """
-        document, run = read_inputs(path, *words, version=cls.version)
+        document, run = read_inputs(path, words or INPUTS, cls.version)
         if not cls.commands:
             return {"": document}, run, ("",)
         known = [*cls.commands][: len(document.values)]

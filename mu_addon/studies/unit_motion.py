@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from functools import cached_property, partial
 from pathlib import Path
 from typing import Any
@@ -67,6 +67,10 @@ def state_message(state: fem.State) -> str:
     return f"{state.pressure_kPa:.4g} kPa, residual {state.residual:.1e}, {state.iterations} iterations"
 
 
+def _in_order(stages: Iterable[str]) -> tuple[str, ...]:
+    return tuple(stages)
+
+
 @attrs.frozen(kw_only=True, eq=False, slots=False)
 class UnitMotion(Study):
     """A unit's design and motion; see `UnitStudy`."""
@@ -90,7 +94,7 @@ class UnitMotion(Study):
         "motion": "displacement, stress and stretch of every state, with and without a sensor, for display",
     }
 
-    stages: tuple[str, ...] = attrs.field(default=STAGES, converter=tuple)
+    stages: tuple[str, ...] = attrs.field(default=STAGES, converter=_in_order)
     unit: design.Unit = given(UnitInput(target="design", modelled=False))
     quality: str = setting(QUALITY, target="design")
     body: design.Body | None = given(BodyInput(group=AROUND), default=None)
@@ -235,7 +239,8 @@ class UnitMotion(Study):
     @property
     def shape(self) -> design.Unit:
         """The unit that is meshed: material and name do not change a mesh."""
-        from ..design.parameters import Material, Wall
+        from ..design.parameters import Material
+        from ..design.wall_material import Wall
 
         return attrs.evolve(self.unit, name="shape", material=Material(), wall=Wall())
 
@@ -269,12 +274,6 @@ class UnitMotion(Study):
         from ..usecases.simulate_and_place.expected import UNSOLVED_REPORT_S, seconds_of
 
         return seconds_of("report") if "simulate" in self.stages else UNSOLVED_REPORT_S
-
-    def detail(self) -> str:
-        """What its stages' seconds depend on."""
-        from ..usecases.simulate_and_place.expected import Size
-
-        return str(Size.of(self)) if "simulate" in self.stages else self.stages[-1]
 
     # Design.
 

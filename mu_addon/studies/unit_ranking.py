@@ -174,6 +174,12 @@ class UnitStudy(UnitMotion):
         if "place" in self.stages:
             core.require_paths(self.unit, self.body, self.limits if self.paths == "graph" else None)
 
+    def detail(self) -> str:
+        """What its stages' seconds depend on."""
+        from ..usecases.simulate_and_place.expected import Size
+
+        return str(Size.of(self)) if "simulate" in self.stages else self.stages[-1]
+
     # What follows from the inputs.
 
     @property

@@ -36,8 +36,8 @@ def use_case_of(folder: Path) -> UseCase[Any]:
     if cases:
         # A file whose first line is another's is read all the same: its reader reports the fault best.
         return next((case for case in cases if case.layout.is_of(folder)), cases[0])
-    names = dict.fromkeys(study(n).layout().inputs for n in STUDIES if not study(n).joins)
-    names = (*MODULES, *names)
+    of_studies = dict.fromkeys(study(n).layout().inputs for n in STUDIES if not study(n).joins)
+    names = (*MODULES, *of_studies)
     raise InputError(
         "this folder contains no study and no other run",
         str(folder),

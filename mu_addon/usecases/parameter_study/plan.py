@@ -148,9 +148,10 @@ class Plan:
         values = self.values[number - 1]
         try:
             changed = changed_inputs(self.inputs, values, self.folder)
-            given = {"unit": changed.unit, "protocol": changed.protocol, "workers": 1}
             tables = {name: TomlTable(table, "[vary]", name=name) for name, table in changed.tables.items()}
-            job = UnitStudy.of_tables(tables, Path("[vary]"), **given)
+            job = UnitStudy.of_tables(
+                tables, Path("[vary]"), unit=changed.unit, protocol=changed.protocol, workers=1
+            )
             return Point(number, values, job)
         except MuError as error:
             return Point(number, values, None, error)

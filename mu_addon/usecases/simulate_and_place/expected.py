@@ -11,6 +11,7 @@ import numpy as np
 from ...placement.elimination import first_and_rest
 
 if TYPE_CHECKING:
+    from ...studies.unit_motion import UnitMotion
     from ...studies.unit_ranking import UnitStudy
 
 BEST = "solid with the best path"
@@ -49,14 +50,14 @@ BYTES = {"interactive": 30_000_000, "export": 150_000_000}
 BYTES_A_NODE = {"simulate": 300, "place": 1000}
 
 
-def expected_nodes(job: UnitStudy) -> int:
+def expected_nodes(job: UnitMotion) -> int:
     """Expected number of a mesh's nodes, from mu-1.0x: 54 000 at a refinement of 0.35, 81 000 at 1."""
     share = {"half": 1.0, "full": 2.0}[job.mesh.fraction]
     units = job.unit.dimensions.count / 6
     return int(share * units * (50_000 + 31_000 * job.mesh.refine**2.7))
 
 
-def expected_bytes(job: UnitStudy) -> int:
+def expected_bytes(job: UnitMotion) -> int:
     """Disk space that a study takes."""
     if "simulate" not in job.stages:
         return BYTES[job.quality]

@@ -36,9 +36,9 @@ from ...run.parts import (
 from . import graph_search, light
 from .candidates import PathCheck, Standing
 from .charts import delta_name, delta_picture, front_chart, response_chart
-from .graph_search import Sensitivity, unstable_at
+from .graph_search import Predicted, Sensitivity, unstable_at
 from .path_motion import PathMotion
-from .place_stages import Light, NamedMotion, Predicted, SearchOutcome, Uncertainty
+from .place_stages import Light, NamedMotion, SearchOutcome, Uncertainty
 from .ranking import COLUMNS, Ranking
 
 if TYPE_CHECKING:
