@@ -82,7 +82,8 @@ class Execution:
             (self._stages[name].title_of(member) if members else self._stages[name].title, name)
             for name, members in self.results.members.items()
             if self._stages[name].title
-            for member in members or [None]
+            # A set that grows may have no member yet.
+            for member in members or [None] * (name in self.results.growing)
         ]
         return [(title, {name for _, name in of}) for title, of in groupby(titled, lambda one: one[0])]
 
