@@ -102,6 +102,12 @@ class TomlTable:
             raise InputError(f"format = {found!r} is not known here", self.at("format"), remedy)
         return self
 
+    def without(self, keys: Sequence[str], why: str) -> None:
+        """Raise InputError where one of the keys is given."""
+        for key in keys:
+            if key in self.values:
+                raise InputError(f"{why}: {key} does not apply there", self.at(key), "leave it out")
+
     def inner(self, key: str) -> TomlTable:
         """The table of a key, empty if it is not there; raises InputError for what is no table."""
         found, name = self.values.get(key, {}), f"{self.name}.{key}" if self.name else key

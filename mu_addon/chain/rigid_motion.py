@@ -81,15 +81,6 @@ def adjoint_of_twist(eta: Array) -> Array:
     return found
 
 
-def adjoint(g: Array) -> Array:
-    """Matrices (..., 6, 6) that carry twists through motions g (..., 4, 4): g exp(xi) g^-1 = exp(Ad xi)."""
-    r = g[..., :3, :3]
-    found = np.zeros((*r.shape[:-2], 6, 6))
-    found[..., :3, :3] = found[..., 3:, 3:] = r
-    found[..., 3:, :3] = skew(g[..., :3, 3]) @ r
-    return found
-
-
 def _slope3(w: Array) -> Array:
     """Left Jacobians (..., 3, 3) of rotation vectors w (..., 3)."""
     return _series(skew(w))

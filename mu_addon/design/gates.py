@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import Any, NoReturn
+from typing import Any
 
 import attrs
 
@@ -87,8 +87,8 @@ def check_solid(
     import manifold3d
 
     solid = manifold3d.Manifold(manifold3d.Mesh64(vertices, triangles.astype("uint64")))
-    if solid.status() != manifold3d.Error.NoError:
-        _fail("closed surface", f"the surface is not a manifold: {solid.status().name}")
+    sound = solid.status() == manifold3d.Error.NoError
+    require((sound, "closed surface", f"the surface is not a manifold: {solid.status().name}"))
     inner = [shell.volume() for shell in (solid + plug).decompose() if shell.volume() < 0.0]
     reread = stl_surface(stl_bytes(vertices, triangles))[1]
     gates = Gates(
@@ -108,7 +108,7 @@ def check_solid(
         triangles=len(triangles),
         guide=guide,
     )
-    require(gates)
+    require_solid(gates)
     return gates
 
 
@@ -131,51 +131,75 @@ def check_waveguide(sensed: Any, bar: Any, cuts: Any, actuator: Sequence[Any], c
         cut_mm3=taken,
         strayed_mm3=taken - float((bar ^ cuts).volume()) + membrane,
     )
-    if guide.strayed_mm3 > STRAYED_MM3:
-        _fail(
+    genus, wanted = guide.genus, guide.genus_expected
+    require(
+        (
+            guide.strayed_mm3 <= STRAYED_MM3,
             "cuts clear of struts and membrane",
             f"wells or pockets of the waveguide take {guide.strayed_mm3:.3g} mm3 from struts or membrane",
-        )
-    if guide.components != 1:
-        _fail("waveguide in one piece", f"lattice and waveguide fall into {guide.components} pieces")
-    if guide.genus != guide.genus_expected:
-        _fail(
+        ),
+        (
+            guide.components == 1,
+            "waveguide in one piece",
+            f"lattice and waveguide fall into {guide.components} pieces",
+        ),
+        (
+            genus == wanted,
             "waveguide genus",
-            f"the lattice with its waveguide has genus {guide.genus}, its graph {guide.genus_expected}: "
-            "a well or a seat makes a tunnel or closes one",
-        )
+            f"the lattice with its waveguide has genus {genus}, its graph {wanted}: a well or a seat makes a "
+            "tunnel or closes one",
+        ),
+    )
     return guide
 
 
-def require(gates: Gates) -> None:
+def require_solid(g: Gates) -> None:
     """Raise GateError for the first gate that fails; the cavity's volume may be off by CAVITY_TOLERANCE."""
-    g = gates
-    if g.lattice_components != 1:
-        _fail("lattice in one piece", f"the bare lattice falls into {g.lattice_components} pieces")
-    if g.lattice_genus != g.lattice_genus_expected:
-        _fail(
-            "lattice genus",
-            f"the bare lattice has genus {g.lattice_genus}, E - V + 1 is {g.lattice_genus_expected}",
-        )
-    if g.components != 1:
-        _fail("one component", f"the surface has {g.components} pieces: loose bodies or sealed voids")
-    if g.bad_edges:
-        _fail("closed surface", f"{g.bad_edges} edges are not shared by two triangles")
-    if g.bad_edges_after_stl:
-        _fail("watertight STL", f"{g.bad_edges_after_stl} edges are open once the STL is read back")
-    if g.inner_shells != 1:
-        _fail(
+    genus, wanted = g.lattice_genus, g.lattice_genus_expected
+    require(
+        (
+            g.lattice_components == 1,
+            "lattice in one piece",
+            f"the bare lattice falls into {g.lattice_components} pieces",
+        ),
+        (genus == wanted, "lattice genus", f"the bare lattice has genus {genus}, E - V + 1 is {wanted}"),
+        *of_surface(g.components, g.bad_edges, g.bad_edges_after_stl),
+        (
+            g.inner_shells == 1,
             "one cavity",
             f"with the inlet plugged there are {g.inner_shells} inner shells, not one: a leak or voids",
-        )
-    if abs(g.inner_volume_error) > CAVITY_TOLERANCE:
-        _fail(
+        ),
+        (
+            abs(g.inner_volume_error) <= CAVITY_TOLERANCE,
             "cavity volume",
             f"the cavity holds {g.inner_volume_mm3:.1f} mm3 and not {g.inner_volume_expected_mm3:.1f} mm3",
-        )
-
-
-def _fail(gate: str, what: str) -> NoReturn:
-    raise GateError(
-        f"{what} (gate: {gate})", "printable solid", "try the other quality or slightly different diameters"
+        ),
     )
+
+
+Gate = tuple[bool, str, str]
+"""Whether a gate holds, its name, and what is so where it does not."""
+
+
+def of_surface(components: int, bad: int, bad_after_stl: int) -> tuple[Gate, ...]:
+    """The gates of every printed surface, by its number of pieces and of open edges, before and after STL."""
+    return (
+        (
+            components == 1,
+            "one component",
+            f"the surface has {components} pieces: loose bodies or sealed voids",
+        ),
+        (bad == 0, "closed surface", f"{bad} edges are not shared by two triangles"),
+        (bad_after_stl == 0, "watertight STL", f"{bad_after_stl} edges are open once the STL is read back"),
+    )
+
+
+def require(
+    *gates: Gate,
+    of: str = "printable solid",
+    remedy: str = "try the other quality or slightly different diameters",
+) -> None:
+    """Raise GateError for the first gate that does not hold."""
+    for holds, gate, what in gates:
+        if not holds:
+            raise GateError(f"{what} (gate: {gate})", of, remedy)

@@ -8,8 +8,6 @@ single cells: valid at the cells' centres and interpolated between them. Struts 
 
 from __future__ import annotations
 
-import math
-import re
 from collections.abc import Iterable
 from functools import cached_property, lru_cache
 from typing import Any, ClassVar, NamedTuple
@@ -18,13 +16,10 @@ import attrs
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from ..errors import InputError
+from .factor_list import LEAST, MOST, FactorList
 from .quantity import quantity, text_quantity
 
 Array = NDArray[np.float64]
-
-LEAST, MOST = 0.5, 2.0
-"""Bounds of every single factor; a strut of 1.5 mm is printable (1.0 mm) down to 0.67."""
 
 ALONG_Z = ("base", "lower", "middle", "upper", "tip")
 """Parameters along the axis, evenly spaced from the middle of the first chamber to that of the last."""
@@ -45,38 +40,21 @@ class CellFactor(NamedTuple):
     factor: float
 
 
+CELLS = FactorList(
+    "grading",
+    "cells",
+    ("number or *", "whole or *", "number or *"),
+    "an entry of cells: column, row, chamber and factor",
+    "0 2 3",
+)
+"""Columns count from 0 in the bending plane to both sides, rows from 0 on the axis toward +y, chambers from 1
+at the inlet."""
+
+
 @lru_cache(maxsize=64)
 def parsed(text: str) -> tuple[CellFactor, ...]:
-    """The entries of a text such as "0 2 3: 0.8; * * 5: 1.2", in one order. Raises InputError.
-
-    An entry is a cell's column, row and chamber, each a whole number or * for all, and its factor. Columns
-    count from 0 in the bending plane to both sides, rows from 0 on the axis toward +y, chambers from 1 at the
-    inlet.
-    """
-    found: dict[tuple[int | None, int | None, int | None], float] = {}
-    for entry in text.split(";"):
-        if not entry.strip():
-            continue
-        match = re.fullmatch(r"\s*(\*|\d+)\s+(\*|-?\d+)\s+(\*|\d+)\s*:\s*(\S+)\s*", entry)
-        try:
-            factor = float(match[4]) if match else math.nan
-        except ValueError:
-            factor = math.nan
-        if match is None or not math.isfinite(factor):
-            raise _refused(
-                f"{entry.strip()!r} is not an entry of cells", 'write column, row and chamber: "0 2 3: 0.8"'
-            )
-        if not LEAST <= factor <= MOST:
-            raise _refused(
-                f"the factor {factor:g} of {entry.strip()!r} is out of bounds",
-                f"choose a value from {LEAST:g} to {MOST:g}",
-            )
-        i, j, k = (None if word == "*" else int(word) for word in match.groups()[:3])
-        if (i, j, k) in found:
-            raise _refused(f"cells lists {entry.strip().split(':')[0]!r} twice", "give each entry once")
-        found[i, j, k] = factor
-    order = sorted(found, key=lambda key: tuple((n is not None, n or 0) for n in key))
-    return tuple(CellFactor(*key, found[key]) for key in order if found[key] != 1.0)
+    """The entries of a text such as "0 2 3: 0.8; * * 5: 1.2", in one order. Raises InputError."""
+    return tuple(CellFactor._make((*place, factor)) for place, factor in CELLS.parsed(text).items())
 
 
 def cells_text(entries: Iterable[CellFactor]) -> str:
@@ -85,19 +63,7 @@ def cells_text(entries: Iterable[CellFactor]) -> str:
     >>> cells_text([CellFactor(0, 2, None, 0.8)])
     '0 2 *: 0.8'
     """
-
-    def word(number: int | None) -> str:
-        return "*" if number is None else str(number)
-
-    return "; ".join(f"{word(i)} {word(j)} {word(k)}: {float(factor)!r}" for i, j, k, factor in entries)
-
-
-def _canonical(text: str) -> str:
-    return cells_text(parsed(text))
-
-
-def _refused(what: str, remedy: str) -> InputError:
-    return InputError(what, "[grading] cells", remedy)
+    return CELLS.text({tuple(entry[:3]): entry.factor for entry in entries})
 
 
 @attrs.frozen
@@ -119,7 +85,7 @@ class Grading:
     beside_x: float = _factor("in the outermost cells across x, over those in the bending plane")
     cells: str = text_quantity(
         "",
-        _canonical,
+        CELLS.canonical,
         'factors of single cells besides, as "column row chamber: factor; ..." with * for all; columns '
         "count from the bending plane to both sides alike, rows from the axis toward +y, chambers from 1 at "
         "the inlet",

@@ -20,7 +20,7 @@ from ..toml_reader import parsed_toml
 from . import shapes, toml_text
 from .anchors import window
 from .assets import asset_file, asset_names
-from .gates import CAVITY_TOLERANCE, GateError
+from .gates import CAVITY_TOLERANCE, of_surface, require
 from .parameters import FORMAT, Unit, load_preset, read_unit
 from .profile import cavity_volume
 from .quantity import describe, quantity
@@ -266,18 +266,14 @@ def _require_open_seats(gripper: Gripper, bar: Bar) -> None:
 def _require(gates: GripperGates) -> None:
     g = gates
     off = [abs(v / g.inner_volume_expected_mm3 - 1.0) for v in g.inner_volumes_mm3]
-    for holds, gate, what in (
-        (g.components == 1, "one component", f"the gripper has {g.components} pieces"),
-        (g.bad_edges == 0, "closed surface", f"{g.bad_edges} edges are not shared by two triangles"),
-        (g.bad_edges_after_stl == 0, "watertight STL", f"{g.bad_edges_after_stl} edges open in the STL"),
+    require(
+        *of_surface(g.components, g.bad_edges, g.bad_edges_after_stl),
         (g.inner_shells == 2, "two cavities", f"with both inlets plugged there are {g.inner_shells} shells"),
         (max(off, default=0.0) <= CAVITY_TOLERANCE, "cavity volume", f"cavities hold {g.inner_volumes_mm3}"),
         (g.genus == g.genus_expected, "genus", f"genus {g.genus}, its parts make {g.genus_expected}"),
-    ):
-        if not holds:
-            raise GateError(
-                f"{what} (gate: {gate})", "gripper", "try the other quality or a slightly different gap"
-            )
+        of="gripper",
+        remedy="try the other quality or a slightly different gap",
+    )
 
 
 def to_toml(gripper: Gripper, unit: str, comments: bool = True) -> str:

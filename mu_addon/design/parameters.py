@@ -20,7 +20,7 @@ from .dimensions import Dimensions
 from .grading import Field, Grading
 from .printed import as_printed
 from .quantity import PAPER, Description, choice, describe, in_MPa, quantity, text_quantity
-from .wall_factors import canonical_text, factors_by_chamber, parsed
+from .wall_factors import WALLS, factors_by_chamber
 from .wall_material import Wall, require_used
 
 FORMAT = 1
@@ -66,7 +66,7 @@ class Chambers:
     )
     wall_factors: str = text_quantity(
         "",
-        canonical_text,
+        WALLS.canonical,
         'factors on the wall of single chambers, as "chamber: factor; ...", chambers counted from 1 at the '
         "inlet; between two apices the wall goes smoothly from one to the other",
         "assumed: the paper's chambers are alike",
@@ -485,7 +485,7 @@ class Unit:
             a=a,
             b=half_pitch - a,
             wall=s * c.wall_mm,
-            wall_factors=factors_by_chamber(parsed(c.wall_factors), c.count),
+            wall_factors=factors_by_chamber(c.wall_factors, c.count),
             base_cap=s * c.base_cap_mm,
             tip_cap=s * c.tip_cap_mm,
             inlet_radius=s * c.inlet_diameter_mm / 2.0,

@@ -69,10 +69,17 @@ class Description(NamedTuple):
 
     def checked(self, value: Any) -> Any:
         """The value as its type; raises InputError for another type, a value out of bounds, no choice."""
-        if self.type is float and isinstance(value, int) and not isinstance(value, bool):
-            value = float(value)
         if self.type is int and isinstance(value, float) and value.is_integer():
             value = int(value)
+        return self.required(value)
+
+    def required(self, value: Any) -> Any:
+        """As `checked`, but a fraction is no whole number, whatever its value."""
+        if self.type is float and isinstance(value, (int, float)) and not isinstance(value, bool):
+            try:
+                value = float(value)
+            except OverflowError:
+                value = math.inf
         if type(value) is not self.type:
             words = {bool: "true or false", int: "a whole number", float: "a number", str: "a text"}
             raise InputError(
@@ -81,7 +88,9 @@ class Description(NamedTuple):
                 _correction(value, self.type, self.unit, self.text),
             )
         if self.choices and value not in self.choices:
-            raise InputError(f"{self.name} = {value!r} is not known", self.name, f"choose {self.allowed}")
+            hint = did_you_mean(str(value), self.choices)
+            what = f"{self.name} = {value!r} is not known{hint}"
+            raise InputError(what, self.name, f"choose {self.allowed}")
         if self._is_out_of_bounds(value):
             unit = f" {self.unit}" if self.unit else ""
             shown = f"{value:g}" if self.type is float else value
@@ -123,19 +132,7 @@ def quantity(
     The arguments are those of `Description`. Setting a value of another type or out of bounds raises
     InputError.
     """
-    kind = type(default)
-    metadata = {
-        "type": kind,
-        "unit": unit,
-        "low": low,
-        "high": high,
-        "text": text,
-        "source": source,
-        "fixed": fixed,
-    }
-    return attrs.field(
-        default=default, metadata=metadata, converter=_real if kind is float else None, validator=_check
-    )
+    return _parameter(Description("", type(default), default, unit, low, high, text, source, fixed))
 
 
 def choice(default: str, names: Callable[[], Sequence[str]], text: str, source: str) -> Any:
@@ -143,17 +140,7 @@ def choice(default: str, names: Callable[[], Sequence[str]], text: str, source: 
 
     Setting another value raises InputError.
     """
-    metadata = {
-        "type": str,
-        "unit": "",
-        "low": math.nan,
-        "high": math.nan,
-        "text": text,
-        "source": source,
-        "fixed": False,
-        "names": names,
-    }
-    return attrs.field(default=default, metadata=metadata, validator=_check_choice)
+    return _parameter(_of_text(default, text, source), names)
 
 
 def text_quantity(default: str, canonical: Callable[[str], str], text: str, source: str) -> Any:
@@ -162,59 +149,45 @@ def text_quantity(default: str, canonical: Callable[[str], str], text: str, sour
     canonical: one text for all with the same meaning; raises InputError for an invalid one. Setting anything
     but a text raises InputError.
     """
-    metadata = {
-        "type": str,
-        "unit": "",
-        "low": math.nan,
-        "high": math.nan,
-        "text": text,
-        "source": source,
-        "fixed": False,
-    }
+    return _parameter(_of_text(default, text, source), canonical=canonical)
 
-    def convert(value: Any) -> Any:
-        return canonical(value) if isinstance(value, str) else value
 
-    def check(instance: Any, field: Any, value: Any) -> None:
-        if not isinstance(value, str):
-            raise InputError(f"{field.name} = {value!r} is not a text", where(instance, field.name), text)
+def _of_text(default: str, text: str, source: str) -> Description:
+    return Description("", str, default, "", math.nan, math.nan, text, source, False)
 
-    return attrs.field(default=default, metadata=metadata, converter=convert, validator=check)
+
+def _parameter(
+    described: Description,
+    names: Callable[[], Sequence[str]] = tuple,
+    canonical: Callable[[Any], Any] = lambda value: value,
+) -> Any:
+    def checked(value: Any, instance: Any, field: Any) -> Any:
+        try:
+            value = _of_field(field).required(value)
+        except InputError as error:
+            raise InputError(error.what, where(instance, field.name), error.remedy) from error
+        return canonical(value)
+
+    converter: Any = attrs.Converter(checked, takes_self=True, takes_field=True)
+    metadata = {"described": described, "names": names}
+    return attrs.field(default=described.default, metadata=metadata, converter=converter)
+
+
+def _of_field(field: Any) -> Description:
+    described, names = field.metadata["described"], field.metadata["names"]
+    found: Description = described._replace(name=field.name, choices=tuple(names()))
+    return found
 
 
 def describe(section: type) -> Iterator[Description]:
     """Descriptions of the parameters of an attrs class, in order; fields without a source are left out."""
-    for field in attrs.fields(section):
-        if "source" in field.metadata:
-            m = field.metadata
-            yield Description(
-                field.name,
-                m["type"],
-                field.default,
-                m["unit"],
-                m["low"],
-                m["high"],
-                m["text"],
-                m["source"],
-                m["fixed"],
-                tuple(m["names"]()) if "names" in m else (),
-            )
+    return (_of_field(field) for field in attrs.fields(section) if "described" in field.metadata)
 
 
 def where(instance: Any, name: str) -> str:
     """A parameter's name as it is written in a file: `[section] name`, or `name` at the top level."""
     section = getattr(type(instance), "section", "")
     return f"[{section}] {name}" if section else name
-
-
-def _real(value: Any) -> Any:
-    """Convert 12 and numpy's numbers to floats; anything else is left for the validator to refuse."""
-    if isinstance(value, bool) or not isinstance(value, (int, float)):
-        return value
-    try:
-        return float(value)
-    except OverflowError:
-        return math.inf
 
 
 def _correction(value: Any, kind: type, unit: str, text: str) -> str:
@@ -227,37 +200,3 @@ def _correction(value: Any, kind: type, unit: str, text: str) -> str:
     if kind not in (int, float) or given not in ("", unit):
         return f"{text}, in {unit}" if unit else text
     return f"write {number}, without quotes{' and unit' if given else ''}: {text}"
-
-
-def _check(instance: Any, field: Any, value: Any) -> None:
-    m = field.metadata
-    kind, unit = m["type"], f" {m['unit']}" if m["unit"] else ""
-    if type(value) is not kind:
-        named = {bool: "true or false", int: "a whole number", float: "a number"}[kind]
-        raise InputError(
-            f"{field.name} = {value!r} is not {named}",
-            where(instance, field.name),
-            _correction(value, kind, m["unit"], m["text"]),
-        )
-    if kind is bool:
-        return
-    if not (math.isfinite(value) and m["low"] <= value <= m["high"]):
-        raise InputError(
-            f"{field.name} = {value:g}{unit} is out of bounds",
-            where(instance, field.name),
-            f"choose a value from {m['low']:g} to {m['high']:g}{unit}",
-        )
-
-
-def _check_choice(instance: Any, field: Any, value: Any) -> None:
-    names = tuple(field.metadata["names"]())
-    if not isinstance(value, str):
-        raise InputError(
-            f"{field.name} = {value!r} is not a name", where(instance, field.name), field.metadata["text"]
-        )
-    if value not in names:
-        raise InputError(
-            f"{field.name} = {value!r} is not known{did_you_mean(value, names)}",
-            where(instance, field.name),
-            f"choose one of {', '.join(names)}",
-        )

@@ -12,7 +12,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from ..errors import InputError
 from . import shapes
-from .gates import GateError
+from .gates import GateError, of_surface, require
 from .lattice import filled
 from .lattice_kinds import LatticeKind
 from .surface import Triangles, Vertices, bad_edges, genus, stl_bytes, stl_surface, volume, weld
@@ -376,18 +376,16 @@ def _require(cell: StrutCell, n: int, vertices: Vertices, triangles: Triangles) 
     from scipy.sparse import coo_matrix
     from scipy.sparse.csgraph import connected_components
 
-    def fail(gate: str, what: str) -> GateError:
-        return GateError(f"{what} (gate: {gate})", "specimen", "try other facets or thinner struts")
-
-    if count := bad_edges(triangles):
-        raise fail("closed surface", f"{count} edges are not shared by two triangles")
-    if count := bad_edges(stl_surface(stl_bytes(vertices, triangles))[1]):
-        raise fail("watertight STL", f"{count} edges are open once the STL is read back")
     links = np.concatenate([triangles[:, [0, 1]], triangles[:, [1, 2]]]).T
     graph = coo_matrix((np.ones(links.shape[1]), links), shape=(len(vertices),) * 2)
-    if (count := connected_components(graph, directed=False)[0]) != 1:
-        raise fail("one component", f"the surface has {count} pieces: loose struts or sealed voids")
+    pieces = int(connected_components(graph, directed=False)[0])
     cells = np.array(list(product(range(n), repeat=3))) * cell.kind.divisions
     lattice = filled(cell.kind, cells, cell.size_mm, cell.junction_radius_mm, cell.midspan_radius_mm)
-    if (found := genus(vertices, triangles)) != lattice.cycles:
-        raise fail("genus", f"the block has genus {found}, E - V + 1 of its graph is {lattice.cycles}")
+    found, wanted = genus(vertices, triangles), lattice.cycles
+    reread = stl_surface(stl_bytes(vertices, triangles))[1]
+    require(
+        *of_surface(pieces, bad_edges(triangles), bad_edges(reread)),
+        (found == wanted, "genus", f"the block has genus {found}, E - V + 1 of its graph is {wanted}"),
+        of="specimen",
+        remedy="try other facets or thinner struts",
+    )

@@ -28,9 +28,7 @@ if TYPE_CHECKING:
     from .compression import compress as compress
     from .compression import compression_of as compression_of
     from .compression import limits_of as limits_of
-    from .effective_file import Effective as Effective
-    from .effective_file import read_effective as read_effective
-    from .effective_file import write_effective as write_effective
+    from .effective_file import effective_text as effective_text
     from .elasticity import Elasticity as Elasticity
     from .elasticity import effective_tensor as effective_tensor
     from .elasticity import young_modulus as young_modulus

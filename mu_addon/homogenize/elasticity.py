@@ -135,26 +135,24 @@ def young_modulus(C: Array, directions: ArrayLike) -> Array:
     return np.asarray(1 / np.einsum("ka,ab,kb->k", stress, np.linalg.inv(C), stress))
 
 
-def effective_tensor(mesh: Mesh, materials: Materials, box: Sequence[float] | None = None) -> Elasticity:
-    """Effective elasticity, at small strain, of a periodic body from the mesh of its eighth, [0, box] mm.
+def effective_tensor(mesh: Mesh, materials: Materials) -> Elasticity:
+    """Effective elasticity, at small strain, of a periodic body from the mesh of its eighth, from 0 on.
 
-    The mesh and its mirror images in its six sides make up the body (`octant.Octant`). box (3,) in mm: by
-    default the mesh's. Energies are those of exact small-strain solutions on the mesh, so never below the
-    true ones of the meshed shape. Raises MeshingError where a piece is loose, or where the result is
-    indefinite or above the Hashin-Shtrikman bound, which no right mesh can give.
+    The mesh and its mirror images in its six sides make up the body (`octant.Octant`). Energies are those of
+    exact small-strain solutions on the mesh, so never below the true ones of the meshed shape. Raises
+    MeshingError where a piece is loose, or where the result is indefinite or above the Hashin-Shtrikman
+    bound, which no right mesh can give.
     """
-    return strained(mesh, materials, box)[0]
+    return strained(mesh, materials)[0]
 
 
-def strained(
-    mesh: Mesh, materials: Materials, box: Sequence[float] | None = None, alike: bool = False
-) -> tuple[Elasticity, Array]:
+def strained(mesh: Mesh, materials: Materials, alike: bool = False) -> tuple[Elasticity, Array]:
     """`effective_tensor`, and the displacements (6, n, 3) in mm under unit mean strains that give it.
 
     In Voigt's order, of engineering shears. alike: mesh and materials have cubic symmetry, so that one shear
     stands for all three and four displacements are returned. Raises MeshingError as that does.
     """
-    octant = Octant(mesh, materials, box)
+    octant = Octant(mesh, materials)
     C = np.zeros((6, 6))
     limit = np.zeros((6, 6))
     shears = SHEARS[:1] if alike else SHEARS

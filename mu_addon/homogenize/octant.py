@@ -9,7 +9,6 @@ only the normal displacement is. So the eighth carries the periodic problem exac
 from __future__ import annotations
 
 import itertools
-from collections.abc import Sequence
 from functools import cached_property
 
 import attrs
@@ -70,28 +69,24 @@ def part(pattern: Pattern, free: Array) -> Part:
 
 
 class Octant:
-    """An eighth [0, box] of a periodic cell as a model without supports, and its materials.
+    """An eighth of a periodic cell as a model without supports, and its materials.
 
-    box: (3,) mm, by default the mesh's. Laws must be symmetric under mirrors across x, y and z, as isotropic
-    ones are. Raises InputError for a mesh that leaves its box or is clamped, MeshingError if it does not
-    reach its sides or a piece of it touches no side.
+    box: (3,) mm, from the origin to the mesh's far sides. Laws must be symmetric under mirrors across x, y
+    and z, as isotropic ones are. Raises InputError for a mesh with nodes below 0 or a clamped one,
+    MeshingError if it does not reach its sides or a piece of it touches no side.
     """
 
-    def __init__(
-        self, mesh: Mesh, materials: Materials, box: Sequence[float] | None = None, threads: int = 2
-    ) -> None:
+    def __init__(self, mesh: Mesh, materials: Materials, threads: int = 2) -> None:
         self.mesh = mesh
-        self.box = np.array(box_of(mesh) if box is None else box, float)
+        self.box = np.array(box_of(mesh), float)
         if mesh.symmetry or len(mesh.base):
             raise InputError(
                 "an eighth of a cell must have neither mirror planes nor a clamped base of its own",
                 "periodic cell",
                 "leave them out: its sides are its supports",
             )
-        if (mesh.nodes < 0).any() or (mesh.nodes > self.box).any():
-            raise InputError(
-                "the mesh extends beyond its cell", f"box {tuple(self.box)} mm", "give half the cell's size"
-            )
+        if (mesh.nodes < 0).any():
+            raise InputError("the mesh extends beyond its cell", "periodic cell", "put its corner at 0")
         self.sides = np.stack([mesh.nodes == 0.0, mesh.nodes == self.box])
         bare = [AXES[k] for k in range(3) if not self.sides[:, :, k].any(axis=1).all()]
         if bare:
@@ -143,41 +138,12 @@ class Octant:
         values = self.model.tangent(u, 0.0, self.parameters)
         return values, self.model.matrix(values)
 
-    def buckling(self, u: Array) -> str:
-        """A buckling mode of the body at the equilibrium u (n, 3) in mm, as text; "" if it is stable.
-
-        Covers motions that repeat after one or two cells along each axis, and homogeneous shears. Such
-        motions are sums of motions that are even or odd under each side's mirror. Does not cover homogeneous
-        stretches and waves longer than two cells.
-        """
-        values, K = self.tangent(u)
-        for turned in itertools.product((False, True), repeat=6):
-            odd = np.reshape(turned, (2, 3))
-            part = self._part(self._kept_by(odd))
-            try:
-                part.factorise(values)
-            except IndefiniteError:
-                return _wave(odd)
-            both = np.flatnonzero(odd.all(axis=0))
-            if len(both) == 2 and odd.sum() == 4:
-                gradient = np.zeros((3, 3))
-                gradient[both, both[::-1]] = 0.5
-                shear = self.affine(gradient)
-                force = K @ shear
-                if shear @ force <= force @ part.solve(force):
-                    return f"a homogeneous shear of {AXES[both[0]]} against {AXES[both[1]]}"
-        return ""
-
     def _kept_by(self, odd: Array) -> Array:
         """Displacements (n, 3), bool, that vanish in motions odd (2, 3) or even under each side's mirror."""
         fixed = np.zeros_like(self.across)
         for side, axis in itertools.product(range(2), range(3)):
             normal = np.arange(3) == axis
             fixed[self.sides[side, :, axis]] |= ~normal if odd[side, axis] else normal
-        for axis in range(3):
-            # A rigid motion costs nothing: it is held at one node.
-            if odd[:, axis].all() and odd.sum() == 2:
-                fixed[0, axis] = True
         return fixed
 
     def _part(self, fixed: Array) -> Part:
@@ -191,14 +157,6 @@ def pieces(mesh: Mesh) -> Array:
     first, other = mesh.tets[:, :1].repeat(mesh.tets.shape[1] - 1, axis=1), mesh.tets[:, 1:]
     links = sparse.coo_matrix((np.ones(other.size), (first.ravel(), other.ravel())), (len(mesh.nodes),) * 2)
     return np.asarray(connected_components(links, directed=False)[1])
-
-
-def _wave(odd: Array) -> str:
-    """A motion odd (2, 3) or even under each side's mirror, as text."""
-    double = [AXES[k] for k in range(3) if odd[0, k] != odd[1, k]]
-    if not double:
-        return "a motion that repeats in every cell"
-    return f"a motion that repeats after two cells along {' and '.join(double)}"
 
 
 def require_factor(part: Part, values: Array) -> None:

@@ -25,17 +25,13 @@ class StretchSettings:
     """Settings of a virtual test of a periodic lattice.
 
     axis: of the stretch, "x", "y" or "z". strains: nominal, at which points are kept; rest is always one.
-    confined: the lateral stretches are held at 1, else their mean stresses are 0. buckling: also test for
-    buckling out of the mirror planes (octant.Octant.buckling), at some 60 factorisations a point. tolerance:
-    residual over the root sum of squares of all element forces; min_step: least step of strain;
+    tolerance: residual over the root sum of squares of all element forces; min_step: least step of strain;
     predictor_tolerance: how far from its prediction a state may lie, as a share of the predicted move. Raises
     InputError for strains not above -1.
     """
 
     axis: str = attrs.field(default="z", validator=attrs.validators.in_(AXES))
     strains: tuple[float, ...] = tuple(float(s) for s in np.linspace(-0.4, 0.4, 41).round(12))
-    confined: bool = False
-    buckling: bool = False
     tolerance: float = 1e-9
     max_iterations: int = 30
     min_step: float = 1e-3
@@ -78,18 +74,17 @@ class Stretched:
 def stretch_lattice(
     mesh: Mesh,
     materials: Materials,
-    box: Sequence[float] | None = None,
     settings: StretchSettings | None = None,
     on_point: Callable[[Point], None] | None = None,
 ) -> Stretched:
     """Uniaxial tension and compression of a periodic lattice at finite strain, by one eighth of its cell.
 
-    mesh: the eighth, [0, box] mm; its sides stay plane, as the lattice's mirror planes demand. A lattice that
-    would buckle away from them is detected with `settings.buckling` only. The curve ends where no stable
-    equilibrium is found or walls meet; `stopped` gives the reason. on_point: called with each `Point`. Raises
-    MeshingError where the undeformed cell is unstable.
+    mesh: the eighth, from 0 on; its sides stay plane, as the lattice's mirror planes demand, and a lattice
+    that would buckle away from them does not. The curve ends where no stable equilibrium is found or walls
+    meet; `stopped` gives the reason. on_point: called with each `Point`. Raises MeshingError where the
+    undeformed cell is unstable.
     """
-    return Stretching(mesh, materials, box, settings).run(on_point)
+    return Stretching(mesh, materials, settings).run(on_point)
 
 
 class Stretching:
@@ -102,13 +97,12 @@ class Stretching:
         self,
         mesh: Mesh,
         materials: Materials,
-        box: Sequence[float] | None = None,
         settings: StretchSettings | None = None,
     ) -> None:
         self.settings = settings or StretchSettings()
-        self.octant = Octant(mesh, materials, box)
+        self.octant = Octant(mesh, materials)
         self.axis = AXES.index(self.settings.axis)
-        self.lateral = () if self.settings.confined else tuple(k for k in range(3) if k != self.axis)
+        self.lateral = tuple(k for k in range(3) if k != self.axis)
         self._part = self.octant.stretching
         self._affine = np.stack([self.octant.affine(np.diag(e)) for e in np.eye(3)], axis=1)
         self._rest = self.octant.tangent(np.zeros_like(mesh.nodes))[0]
@@ -125,15 +119,11 @@ class Stretching:
         wanted = sorted(set(self.settings.strains) - {0.0})
         compressed, why_compressed = self._along([s for s in wanted if s < 0][::-1], rest, on_point)
         pulled, why_pulled = self._along([s for s in wanted if s > 0], rest, on_point)
-        if self.settings.buckling:
-            compressed, why_compressed = self._until_buckled(compressed, why_compressed)
-            pulled, why_pulled = self._until_buckled(pulled, why_pulled)
         points = (*compressed[::-1], rest, *pulled)
-        sides = [k for k in range(3) if k != self.axis]
         curve = Curve(
             [p.stretch[self.axis] for p in points],
             [p.stress_MPa[self.axis] for p in points],
-            [p.stretch[sides] for p in points],
+            [p.stretch[list(self.lateral)] for p in points],
         )
         return Stretched(curve, points, "; ".join(w for w in (why_compressed, why_pulled) if w))
 
@@ -155,21 +145,6 @@ class Stretching:
             if on_point:
                 on_point(steps[-1])
         return found, ""
-
-    def _until_buckled(self, points: list[Point], stopped: str) -> tuple[list[Point], str]:
-        """Points up to the last stable one, assuming that buckling persists once begun; and the reason."""
-        stable, unstable, way = 0, len(points) + 1, ""
-        asked = len(points)
-        while unstable - stable > 1:
-            if found := self.octant.buckling(points[asked - 1].u):
-                unstable, way = asked, found
-            else:
-                stable = asked
-            asked = (stable + unstable) // 2
-        if not way:
-            return points, stopped
-        strain = points[stable].strain
-        return points[:stable], f"the lattice buckles before a strain of {strain:.3f}: {way}"
 
     def reach(self, strain: float, history: Sequence[Point]) -> list[Point]:
         """The states on the way to a strain, from converged ones before it, the last of them the nearest.

@@ -32,7 +32,6 @@ if TYPE_CHECKING:
     from .library import material_names as material_names
     from .library import material_text as material_text
     from .library import read_material as read_material
-    from .library import write_material as write_material
     from .stability import Stability as Stability
     from .stability import check_stability as check_stability
 else:

@@ -17,7 +17,6 @@ from ..design.quantity import in_kPa
 from ..design.wall_material import DEFAULT, Wall, require_used
 from ..errors import InputError
 from ..fem import laws
-from ..files import write_text
 from ..reading import text_in
 from ..toml_reader import TomlTable, parsed_toml
 from ..toml_writer import toml_value
@@ -295,14 +294,6 @@ def _ranges(table: TomlTable) -> dict[str, tuple[float, float]]:
             what = f"the range of {mode}, {[low, high]}, does not go from above 0 up to 1 and from 1 on"
             raise InputError(what, where, remedy)
     return ranges
-
-
-def write_material(material: Material, path: Path, head: str = "") -> None:
-    """Write a material as TOML that `read_material` reads, below the lines of `head` as comments.
-
-    Raises OutputError.
-    """
-    write_text(path, material_text(material, head))
 
 
 def material_text(material: Material, head: str = "") -> str:

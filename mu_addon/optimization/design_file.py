@@ -20,7 +20,7 @@ from ..reading import text_in
 from ..toml_reader import TomlTable, parsed_toml
 from ..toml_writer import toml_text
 from . import settings as settings_of
-from .freedoms import PATH, Freedom, changed_unit, fixed_values, read_freedoms
+from .freedoms import PATH, Freedom, changed_unit, not_fixed, read_freedoms, with_fixed
 from .freedoms import RESIN as RESIN_FREEDOM
 from .quantities import Stretch
 from .search import SearchSettings
@@ -194,33 +194,27 @@ def parse_design(
     text: str,
     origin: str,
     unit: Unit | None = None,
-    folder: Path | None = None,
+    folder: Path = Path(),
     body: Body | None = None,
 ) -> Design:
     """The design in TOML text; raises InputError with file, line and key.
 
     unit, body: replace those that the text names; folder: of its files.
     """
-    folder = folder or Path()
     document = parsed_toml(text, origin).only(_KEYS).of_format(FORMAT)
     number, asked, free = document.setting, document.tables("target"), document.tables("freedom")
-    origin = origin or "TOML text"
-    base = unit or _unit(document, folder)
-    fixed = fixed_values(free)
-    base = changed_unit(base, [Freedom(name) for name in fixed], list(fixed.values()))
+    base = with_fixed(unit or _unit(document, folder), free)
     freedoms = read_freedoms(free, base)
     resin, printer = document.word("resin", default=USUAL_RESIN), document.word("printer", default=DEFAULT)
     material = _material(resin, folder, document.at("resin"))
+    choices = {f.name: (f.values, table) for f, table in zip(freedoms, not_fixed(free), strict=True)}
+    names, resins = choices.get(RESIN_FREEDOM, ((), document))
     materials = {
-        name: material if name == resin else _material(name, folder, free[0].at())
-        for f in freedoms
-        if f.name == RESIN_FREEDOM
-        for name in f.values
+        name: material if name == resin else _material(name, folder, resins.at("values")) for name in names
     }
     if body is None and "body" in document:
         body = read_body(folder / document.word("body"))
-    counts = [v for f in freedoms if f.name == "chambers.count" for v in f.values] or [base.chambers.count]
-    paths = [w.name for w in windows(min(counts))]
+    paths = [w.name for w in windows(min(choices.get("chambers.count", ([base.chambers.count],))[0]))]
     turned = number(ORIENTATION) if "orientation_deg" in document else None
     targets = read_targets(
         asked,
@@ -230,27 +224,26 @@ def parse_design(
             load_printer(printer),
             paths,
             turned is not None,
-            any(f.name == PATH for f in freedoms),
+            PATH in choices,
             body,
         ),
     )
-    for table in free:
-        for path in table.values.get("values", ()) if table.values.get("parameter") == PATH else ():
-            if path not in paths:
-                what = f"{path!r} is not a path of the unit"
-                raise InputError(what, table.at("values"), f"of: {', '.join(paths)}")
+    named, table = choices.get(PATH, ((), document))
+    for path in named:
+        if path not in paths:
+            what = f"{path!r} is not a path of the unit"
+            raise InputError(what, table.at("values"), f"of: {', '.join(paths)}")
     settings = MeshSettings(refine=number(settings_of.REFINE))
     search = SearchSettings(
-        evaluations=number(settings_of.EVALUATIONS),
-        batch=number(settings_of.BATCH),
-        seed=number(settings_of.SEED),
+        *(number(d) for d in (settings_of.EVALUATIONS, settings_of.BATCH, settings_of.SEED))
     )
     return Design(
         base, tuple(targets), tuple(freedoms), settings,
         number(settings_of.CHECK_REFINE, min(FINER * settings.refine, settings_of.REFINE.high)), search,
         printer, resin,
         number(settings_of.PRINT_TOLERANCE), number(settings_of.MODULUS_TOLERANCE), document.values,
-        material, turned, number(settings_of.ROBUST), materials, body, number(settings_of.SELF_CONTACT),
+        material, turned, number(settings_of.ROBUST), materials, body,
+        number(settings_of.SELF_CONTACT),
     )  # fmt: skip
 
 

@@ -4,15 +4,16 @@ from __future__ import annotations
 
 import math
 import re
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from typing import Any
 
 import attrs
 
-from ..design import grading, wall_factors
-from ..design.grading import CellFactor
+from ..design.factor_list import LEAST, MOST, FactorList, Place, place_text
+from ..design.grading import CELLS
 from ..design.parameters import SECTIONS, Unit
 from ..design.quantity import Description, describe
+from ..design.wall_factors import WALLS
 from ..errors import InputError, did_you_mean
 from ..meshing.settings import OF_CONTINUUM, require_printed
 from ..toml_reader import TomlTable
@@ -22,73 +23,22 @@ PATH, RESIN = "path", "resin"
 """Freedoms besides a unit's parameters: the path of the sensor, and the resin of the unit."""
 
 
-@attrs.frozen
-class FactorList:
-    """A parameter that is a text of factors by place; each factor may be free: "grading.cells[0 2 *]".
+FACTOR_LISTS = {
+    "grading.cells": (CELLS, "cells", "column, row and chamber", "0 2 *"),
+    "chambers.wall_factors": (WALLS, "chamber", "chamber, counted from 1 at the inlet", "2"),
+}
+"""Parameters that are texts of factors by place, of which each may be free: "grading.cells[0 2 *]".
 
-    key: of a [[freedom]] table, names the place; place: its notation, with an example. factors: from a text,
-    by the text of their place; text: the inverse; both raise InputError.
-    """
-
-    name: str
-    key: str
-    place: tuple[str, str]
-    low: float
-    high: float
-    factors: Callable[[str], dict[str, float]]
-    text: Callable[[Mapping[str, float]], str]
-
-    def canonical(self, place: str) -> str:
-        """Canonical text of all that name the same place; raises InputError."""
-        # Any factor but 1, which would be no entry.
-        [found] = self.factors(f"{place}: 1.5")
-        return found
-
-    def of(self, unit: Unit) -> dict[str, float]:
-        """Factors of the unit by their place."""
-        section, _, name = self.name.partition(".")
-        return self.factors(getattr(getattr(unit, section), name))
+With the key of a [[freedom]] table that names the place, its notation, and an example."""
 
 
-def _cells_by_place(text: str) -> dict[str, float]:
-    entries = grading.parsed(text)
-    return {grading.cells_text([e._replace(factor=1.5)]).rpartition(":")[0]: e.factor for e in entries}
-
-
-def _text_of_cells(factors: Mapping[str, float]) -> str:
-    [*entries] = (
-        CellFactor(*grading.parsed(f"{place}: 1.5")[0][:3], factor) for place, factor in factors.items()
-    )
-    return grading.cells_text(entries)
-
-
-FACTOR_LISTS = (
-    FactorList(
-        "grading.cells",
-        "cells",
-        ("column, row and chamber", "0 2 *"),
-        grading.LEAST,
-        grading.MOST,
-        _cells_by_place,
-        _text_of_cells,
-    ),
-    FactorList(
-        "chambers.wall_factors",
-        "chamber",
-        ("chamber, counted from 1 at the inlet", "2"),
-        wall_factors.LEAST,
-        wall_factors.MOST,
-        lambda text: {str(chamber): factor for chamber, factor in wall_factors.parsed(text).items()},
-        lambda factors: wall_factors.text_of({int(chamber): f for chamber, f in factors.items()}),
-    ),
-)
-
-
-def _entry(name: str) -> tuple[FactorList, str] | None:
-    """List and place of a name such as "grading.cells[0 2 *]"; None for another name."""
+def _entry(name: str) -> tuple[str, FactorList, Place] | None:
+    """Parameter, list and place of a name such as "grading.cells[0 2 *]"; None for another name."""
     match = re.fullmatch(r"([^\[]+)\[(.+)\]", name)
-    lists = [known for known in FACTOR_LISTS if match is not None and match[1] == known.name]
-    return (lists[0], match[2]) if match is not None and lists else None
+    if match is None or match[1] not in FACTOR_LISTS:
+        return None
+    factors = FACTOR_LISTS[match[1]][0]
+    return match[1], factors, factors.place(match[2])
 
 
 @attrs.frozen
@@ -144,8 +94,8 @@ def parameters() -> dict[str, Description]:
 def parameter_of(unit: Unit, name: str) -> Any:
     """Value of a unit's parameter by its dotted name."""
     if entry := _entry(name):
-        listed, place = entry
-        return listed.of(unit).get(listed.canonical(place), 1.0)
+        listed, factors, place = entry
+        return factors.parsed(parameter_of(unit, listed)).get(place, 1.0)
     found: Any = unit
     for part in name.split("."):
         found = getattr(found, part)
@@ -159,37 +109,34 @@ def changed_unit(unit: Unit, freedoms: Sequence[Freedom], values: Sequence[Any])
     """
     sections: dict[str, dict[str, Any]] = {}
     head: dict[str, Any] = {}
-    entries: dict[str, dict[str, float]] = {}
+    entries: dict[str, dict[Place, float]] = {}
     for freedom, value in zip(freedoms, values, strict=True):
         for name, factor in ((freedom.name, None), *freedom.also.items()):
             own = value if factor is None else factor * value
             if entry := _entry(name):
-                listed, place = entry
-                entries.setdefault(listed.name, {})[listed.canonical(place)] = float(own)
+                entries.setdefault(entry[0], {})[entry[2]] = float(own)
                 continue
             section, _, key = name.rpartition(".")
             if section:
                 sections.setdefault(section, {})[key] = own
             else:
                 head[key] = own
-    for listed in FACTOR_LISTS:
-        if listed.name in entries:
-            section, _, key = listed.name.partition(".")
-            sections.setdefault(section, {})[key] = listed.text(listed.of(unit) | entries[listed.name])
+    for listed, own in entries.items():
+        factors, (section, _, key) = FACTOR_LISTS[listed][0], listed.partition(".")
+        text = factors.text(factors.parsed(parameter_of(unit, listed)) | own)
+        sections.setdefault(section, {})[key] = text
     changed = {section: attrs.evolve(getattr(unit, section), **own) for section, own in sections.items()}
     return attrs.evolve(unit, **head, **changed)
 
 
 def read_freedoms(tables: Sequence[TomlTable], unit: Unit) -> list[Freedom]:
-    """The freedoms of [[freedom]] tables; those that are fixed only change the unit (`fixed_values`).
+    """The freedoms of [[freedom]] tables; those with `fixed` are in the unit already, by `with_fixed`.
 
     Raises InputError that names key and line.
     """
     found: list[Freedom] = []
-    for table in tables:
+    for table in not_fixed(tables):
         freedom = _freedom(table)
-        if freedom is None:
-            continue
         if freedom.name in {f.name for f in found}:
             raise InputError(f"{freedom.name} is listed twice", table.at(), "leave one of the two out")
         _require_start(freedom, unit, table)
@@ -203,13 +150,20 @@ def read_freedoms(tables: Sequence[TomlTable], unit: Unit) -> list[Freedom]:
     return found
 
 
-def fixed_values(tables: Sequence[TomlTable]) -> dict[str, Any]:
-    """Values by name of the [[freedom]] tables with `fixed`; raises InputError for an unknown name."""
+def not_fixed(tables: Sequence[TomlTable]) -> list[TomlTable]:
+    """The tables of what is free."""
+    return [table for table in tables if "fixed" not in table]
+
+
+def with_fixed(unit: Unit, tables: Sequence[TomlTable]) -> Unit:
+    """The unit with the values of [[freedom]] tables with `fixed`; raises InputError."""
     fixed = [table.only(("parameter", "fixed")) for table in tables if "fixed" in table]
-    return {_parameter(table)[0]: table.values["fixed"] for table in fixed}
+    values = {_parameter(table).name: table.values["fixed"] for table in fixed}
+    return changed_unit(unit, [Freedom(name) for name in values], list(values.values()))
 
 
-def _parameter(table: TomlTable) -> tuple[str, Description]:
+def _parameter(table: TomlTable) -> Description:
+    """Description of the parameter that a table names, by its dotted name; raises InputError."""
     known, name = parameters(), table.values.get("parameter")
     require_printed(name, table.at("parameter"))
     if not isinstance(name, str) or name not in known:
@@ -219,39 +173,28 @@ def _parameter(table: TomlTable) -> tuple[str, Description]:
             table.at("parameter"),
             "name it as in a unit's file: chambers.wall_mm, lattice.kind, scale; or path, resin",
         )
-    return name, known[name]
+    return known[name]._replace(name=name)
 
 
-def _freedom(table: TomlTable) -> Freedom | None:
+def _freedom(table: TomlTable) -> Freedom:
     if table.values.get("parameter") in (PATH, RESIN):
         name = table.only(("parameter", "values")).word("parameter")
         return Freedom(name, values=_values(table, tuple[str, ...]))
-    name, d = _parameter(table)
-    if "fixed" in table:
-        return None
-    for listed in FACTOR_LISTS:
-        if name == listed.name and listed.key in table:
-            return _of_factor(listed, table)
+    d = _parameter(table)
+    if d.name in FACTOR_LISTS and FACTOR_LISTS[d.name][1] in table:
+        return _of_factor(d.name, table)
     also = _also(table.only(("parameter", "low", "high", "values", "also")))
     if "values" in table:
-        if "low" in table or "high" in table:
-            what = f"{name} has both bounds and values"
-            raise InputError(what, table.at("values"), "write values = [..] alone, or low and high")
-        return Freedom(name, values=_values(table, tuple[Any, ...]), also=also, unit=d.unit)
-    low, high = table.take("low", float), table.take("high", float)
+        table.without(("low", "high"), f"{d.name} has values")
+        return Freedom(d.name, values=_values(table, tuple[Any, ...]), also=also, unit=d.unit)
     if d.type not in (float, int):
-        raise InputError(f"{name} has no range", table.at("low"), f"write values = [..] of {d.allowed}")
-    if not d.low <= low < high <= d.high:
-        raise InputError(
-            f"low = {low:g} and high = {high:g} of {name} are not a range within its bounds",
-            table.at("low"),
-            f"choose from {d.low:g} to {d.high:g} {d.unit}".rstrip(),
-        )
-    if d.type is int:
-        if low != int(low) or high != int(high):
-            raise InputError(f"{name} is a whole number", table.at("low"), "give whole numbers")
-        return Freedom(name, values=tuple(range(int(low), int(high) + 1)), also=also, unit=d.unit)
-    return Freedom(name, low, high, also=also, unit=d.unit)
+        raise InputError(f"{d.name} has no range", table.at("low"), f"write values = [..] of {d.allowed}")
+    low, high = _range(table, d.low, d.high, f"{d.name} are not a range within its bounds", d.unit)
+    if d.type is not int:
+        return Freedom(d.name, low, high, also=also, unit=d.unit)
+    if low != int(low) or high != int(high):
+        raise InputError(f"{d.name} is a whole number", table.at("low"), "give whole numbers")
+    return Freedom(d.name, values=tuple(range(int(low), int(high) + 1)), also=also, unit=d.unit)
 
 
 def _values(table: TomlTable, hint: Any) -> tuple[Any, ...]:
@@ -262,27 +205,27 @@ def _values(table: TomlTable, hint: Any) -> tuple[Any, ...]:
     return tuple(dict.fromkeys(values))
 
 
-def _of_factor(listed: FactorList, table: TomlTable) -> Freedom:
+def _range(table: TomlTable, least: float, most: float, of: str, unit: str = "") -> tuple[float, float]:
+    """The bounds that a table gives; raises InputError where they are no range within others."""
+    low, high = table.take("low", float), table.take("high", float)
+    if not least <= low < high <= most:
+        remedy = f"choose from {least:g} to {most:g} {unit}".rstrip()
+        raise InputError(f"low = {low:g} and high = {high:g} of {of}", table.at("low"), remedy)
+    return low, high
+
+
+def _of_factor(name: str, table: TomlTable) -> Freedom:
     """The factor at the place that a table names; raises InputError."""
-    given = table.only(("parameter", listed.key, "low", "high")).values[listed.key]
-    place = str(given) if type(given) in (str, int) and ";" not in str(given) else "?"
-    what, example = listed.place
+    factors, key, what, example = FACTOR_LISTS[name]
+    given = table.only(("parameter", key, "low", "high")).values[key]
     try:
-        place = listed.canonical(place)
+        place = place_text(factors.place(str(given) if type(given) in (str, int) else "?"))
     except InputError as error:
         raise InputError(
-            f"{listed.key} = {given!r} does not give {what}",
-            table.at(listed.key),
-            f'write {listed.key} = "{example}"',
+            f"{key} = {given!r} does not give {what}", table.at(key), f'write {key} = "{example}"'
         ) from error
-    low, high = table.take("low", float), table.take("high", float)
-    if not listed.low <= low < high <= listed.high:
-        raise InputError(
-            f"low = {low!r} and high = {high!r} of {listed.key} {place} are not a range of factors",
-            table.at("low"),
-            f"choose from {listed.low:g} to {listed.high:g}",
-        )
-    return Freedom(f"{listed.name}[{place}]", low, high)
+    low, high = _range(table, LEAST, MOST, f"{key} {place} are not a range of factors")
+    return Freedom(f"{name}[{place}]", low, high)
 
 
 def _also(table: TomlTable) -> dict[str, float]:
@@ -303,15 +246,12 @@ def _require_start(freedom: Freedom, unit: Unit, table: TomlTable) -> None:
         try:
             changed_unit(unit, [freedom], [freedom.low])
         except InputError as error:
-            raise InputError(error.what, table.at(entry[0].key), error.remedy) from error
+            raise InputError(error.what, table.at(FACTOR_LISTS[entry[0]][1]), error.remedy) from error
         return
     d = parameters()[freedom.name]
     for value in freedom.values:
         fits = type(value) is d.type or (d.type is float and type(value) is int)
         within = value in d.choices if d.choices else d.type is bool or (fits and d.low <= value <= d.high)
         if not (fits and within):
-            raise InputError(
-                f"{value!r} is not a value of {freedom.name}",
-                table.at("values"),
-                f"choose {d.allowed or 'true or false'}",
-            )
+            what = f"{value!r} is not a value of {freedom.name}"
+            raise InputError(what, table.at("values"), f"choose {d.allowed or 'true or false'}")

@@ -28,13 +28,9 @@ SMALL_MM = 1e-3
 """Largest displacement at which the stiffness at rest is read off residuals."""
 
 
-def _under_pressure(pressure_kPa: float) -> tuple[Condition, ...]:
-    return (Condition(WITHOUT, pressure_kPa),)
-
-
 @attrs.frozen
-class Angle:
-    """Bending angle in degrees at a pressure in kPa, see `bending_angle_deg`."""
+class _AtPressure:
+    """A quantity of the state at a pressure in kPa."""
 
     name: str
     pressure_kPa: float
@@ -42,7 +38,12 @@ class Angle:
     @property
     def conditions(self) -> tuple[Condition, ...]:
         """The state at its pressure."""
-        return _under_pressure(self.pressure_kPa)
+        return (Condition(WITHOUT, self.pressure_kPa),)
+
+
+@attrs.frozen
+class Angle(_AtPressure):
+    """Bending angle in degrees at a pressure in kPa, see `bending_angle_deg`."""
 
     def value(self, structure: Structure, states: States) -> float:
         """Value in degrees."""
@@ -103,17 +104,10 @@ class TipForce:
 
 
 @attrs.frozen
-class TipPosition:
+class TipPosition(_AtPressure):
     """Displacement in mm of the tip's end plane along y or z at a pressure in kPa, its mean."""
 
-    name: str
-    pressure_kPa: float
     direction: str = "y"
-
-    @property
-    def conditions(self) -> tuple[Condition, ...]:
-        """The state at its pressure."""
-        return _under_pressure(self.pressure_kPa)
 
     def value(self, structure: Structure, states: States) -> float:
         """Value in mm."""
@@ -168,7 +162,7 @@ class AirVolume:
     @property
     def conditions(self) -> tuple[Condition, ...]:
         """The state at its pressure, none at 0."""
-        return _under_pressure(self.pressure_kPa) if self.pressure_kPa else ()
+        return (Condition(WITHOUT, self.pressure_kPa),) if self.pressure_kPa else ()
 
     def value(self, structure: Structure, states: States) -> float:
         """Value in ml."""
@@ -197,7 +191,7 @@ class AirVolume:
 
 
 @attrs.frozen
-class Stretch:
+class Stretch(_AtPressure):
     """Largest principal stretch in the wall or the struts at a pressure in kPa.
 
     The mean over that 1 % of the region's volume that is stretched most: the largest of all points depends on
@@ -205,15 +199,8 @@ class Stretch:
     break, as a ratio; where it is given, the value is the safety factor elongation/(stretch - 1).
     """
 
-    name: str
-    pressure_kPa: float
     region: str = "wall"
     elongation: float | None = None
-
-    @property
-    def conditions(self) -> tuple[Condition, ...]:
-        """The state at its pressure."""
-        return _under_pressure(self.pressure_kPa)
 
     def value(self, structure: Structure, states: States) -> float:
         """A ratio."""
@@ -394,16 +381,8 @@ class RestStiffness:
 
 
 @attrs.frozen
-class WallsApart:
+class WallsApart(_AtPressure):
     """1 if no wall of the body passes through another at a pressure in kPa, else 0; it has no slope."""
-
-    name: str
-    pressure_kPa: float
-
-    @property
-    def conditions(self) -> tuple[Condition, ...]:
-        """The state at its pressure."""
-        return _under_pressure(self.pressure_kPa)
 
     def value(self, structure: Structure, states: States) -> float:
         """1 or 0."""

@@ -23,14 +23,13 @@ NOISE = 1e-4
 
 @attrs.frozen(eq=False)
 class Surrogate:
-    """A quantity over designs in the unit cube; `mean` and `deviation` predict it."""
+    """A quantity over designs in the unit cube; `mean` predicts it."""
 
     x: Array
     lengths: Array
     centre: float
     size: float
     _which: Array
-    _factor: Array
     _weights: Array
 
     @classmethod
@@ -44,35 +43,25 @@ class Surrogate:
         which = np.flatnonzero(np.isfinite(observed))
         observed = observed[which]
         d = x.shape[1]
-        best: tuple[float, Array, Array, Array] | None = None
+        best: tuple[float, Array, Array] | None = None
         lengths = np.ones(d)
         candidates = [np.full(d, length) for length in LENGTHS]
         for round_ in range(1 + d):
             for trial in candidates:
                 found = _fitted(x, trial, which, observed)
                 if found is not None and (best is None or found[0] > best[0]):
-                    best = (found[0], trial, *found[1:])
+                    best = (found[0], trial, found[1])
             if best is None:
                 raise ArithmeticError("no covariance of the designs can be factorised")
             lengths = best[1]
             if round_ < d:
                 candidates = [np.where(np.arange(d) == round_, f * lengths, lengths) for f in (0.5, 2.0)]
         assert best is not None
-        return cls(x, best[1], centre, size, which, best[2], best[3])
+        return cls(x, best[1], centre, size, which, best[2])
 
     def mean(self, at: Array) -> Array:
         """Expected values (m,) at designs (m, d)."""
         return self.centre + self.size * (self._between(at) @ self._weights)
-
-    def deviation(self, at: Array) -> Array:
-        """Standard deviations (m,) at designs (m, d)."""
-        from scipy.linalg import solve_triangular
-
-        # The likelihood leaves the height of the process at the observations' own.
-        scale = np.sqrt(max(float(self._weights @ (self._factor @ (self._factor.T @ self._weights))), 0.0))
-        reduced = solve_triangular(self._factor, self._between(at).T, lower=True)
-        left = np.maximum(1.0 - (reduced**2).sum(axis=0), 0.0)
-        return np.asarray(self.size * scale / np.sqrt(len(self._which)) * np.sqrt(left))
 
     def _between(self, at: Array) -> Array:
         """Covariances (m, o) of values at designs with the observations."""
@@ -84,8 +73,8 @@ class Surrogate:
         ]
 
 
-def _fitted(x: Array, lengths: Array, which: Array, observed: Array) -> tuple[float, Array, Array] | None:
-    """Log likelihood, Cholesky factor and weights for some lengths, None where they are not definite."""
+def _fitted(x: Array, lengths: Array, which: Array, observed: Array) -> tuple[float, Array] | None:
+    """Log likelihood and weights for some lengths, None where they are not definite."""
     from scipy.linalg import cho_solve
 
     matrix = _covariance(x, lengths)[np.ix_(which, which)]
@@ -98,7 +87,7 @@ def _fitted(x: Array, lengths: Array, which: Array, observed: Array) -> tuple[fl
     weights = cho_solve((factor, True), observed)
     n = len(observed)
     variance = max(float(observed @ weights) / n, 1e-300)
-    return -0.5 * n * np.log(variance) - float(np.log(np.diag(factor)).sum()), factor, weights
+    return -0.5 * n * np.log(variance) - float(np.log(np.diag(factor)).sum()), weights
 
 
 def _covariance(x: Array, lengths: Array) -> Array:

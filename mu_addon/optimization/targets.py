@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from typing import Any, Literal
 
 import attrs
 
 from ..design.body import Body
 from ..errors import InputError
+from ..meshing.mesh import AXES
 from ..reading import is_finite
 from ..toml_reader import TomlTable
 from .quantities import (
@@ -24,7 +25,7 @@ from .quantities import (
 )
 from .sensor_quantities import Disturbance, SensorSlope
 from .structure import Quantity
-from .target_kinds import GAP, KINDS, PRESSURE
+from .target_kinds import AT, GAP, KINDS, OVER, PRESSURE
 from .unit_quantities import Mass, PrintTime, WallThickness
 
 Goal = Literal["minimise", "maximise"]
@@ -150,48 +151,46 @@ def _targets(table: TomlTable, supplies: Supplies) -> list[Target]:
     name = table.word("name", default=_name(kind, table.values))
     if len(name) > 60 or not name.isprintable():
         raise InputError(f"name = {name!r} is not a name", table.at("name"), "write a short text in quotes")
-    quantity = _quantity(kind, name, table, supplies)
+    quantity, unit = _MADE[kind](_Asked(table, kind, name, supplies)), KINDS[kind].unit
     if KINDS[kind].is_yes:
-        _refuse(table, ("value", "tolerance", "low", "high", "objective"), f"{kind} is a yes or a no")
-        return [Target(name, kind, "", quantity, tolerance=1.0, low=1.0, line=table.at())]
-    return [Target(name, kind, KINDS[kind].unit, quantity, **_asked(table, kind), line=table.at())]
+        table.without(("value", "tolerance", "low", "high", "objective"), f"{kind} is a yes or a no")
+        return [Target(name, kind, unit, quantity, tolerance=1.0, low=1.0, line=table.at())]
+    return [Target(name, kind, unit, quantity, **_goal(table, kind), line=table.at())]
 
 
 def _name(kind: str, table: Mapping[str, Any]) -> str:
     """A name from the quantity and its pressure or axis: "angle at 30 kPa", "stiffness along x"."""
     words = kind.replace("_", " ")
-    if "region" in table:
-        words += f" of {table['region']}"
-    if "path" in table:
-        words += f" of {table['path']}"
-    if "pressure_kPa" in table:
-        words += f" at {table['pressure_kPa']:g} kPa" if is_finite(table["pressure_kPa"]) else ""
-    if "gap_mm" in table:
-        words += f" on a wall at {table['gap_mm']:g} mm" if is_finite(table["gap_mm"]) else ""
-    return f"{words} along {table['direction']}" if "direction" in table else words
+    for key, before, unit in (
+        ("region", "of", ""), ("path", "of", ""), ("pressure_kPa", "at", " kPa"),
+        ("gap_mm", "on a wall at", " mm"), ("direction", "along", ""),
+    ):  # fmt: skip
+        value = table.get(key)
+        if unit and is_finite(value):
+            words += f" {before} {value:g}{unit}"
+        elif not unit and key in table:
+            words += f" {before} {value}"
+    return words
 
 
-def _asked(table: TomlTable, kind: str) -> dict[str, Any]:
-    goal = table.word("objective", ("minimise", "maximise"), None)
-    has_bound = "low" in table or "high" in table
-    if ("value" in table) + has_bound + (goal is not None) != 1:
+def _goal(table: TomlTable, kind: str) -> dict[str, Any]:
+    """Goal, or value or bounds with their tolerance; raises InputError."""
+    bounds = [key for key in ("low", "high") if key in table]
+    if ("value" in table) + bool(bounds) + ("objective" in table) != 1:
         raise InputError(
             f"{kind} must have either value and tolerance, or low and high, or objective", table.at(),
             'write value = 40, tolerance = 1; or low = 40; or objective = "minimise"',
         )  # fmt: skip
-    if goal is not None:
-        _refuse(table, ("tolerance",), "an objective has no tolerance")
-        return {"goal": goal}
-    if "value" in table:
-        if "tolerance" not in table:
-            raise InputError("a value has no tolerance", table.at("tolerance"), "write tolerance = ..")
-        found = {key: _number(table, key) for key in ("value", "tolerance")}
-    else:
-        found = {key: _number(table, key) for key in ("low", "high") if key in table}
-        if found.get("low", -math.inf) >= found.get("high", math.inf):
-            raise InputError("low is not below high", table.at("low"), "exchange the two")
-        largest = max(abs(v) for v in found.values())
-        found["tolerance"] = _number(table, "tolerance", NARROW * (largest or 1.0))
+    if "objective" in table:
+        table.without(("tolerance",), "an objective has no tolerance")
+        return {"goal": table.word("objective", ("minimise", "maximise"))}
+    if "value" in table and "tolerance" not in table:
+        raise InputError("a value has no tolerance", table.at("tolerance"), "write tolerance = ..")
+    found = {key: table.number(key) for key in bounds or ("value",)}
+    if found.get("low", -math.inf) >= found.get("high", math.inf):
+        raise InputError("low is not below high", table.at("low"), "exchange the two")
+    usual = NARROW * (max(abs(v) for v in found.values()) or 1.0)
+    found["tolerance"] = table.number("tolerance", default=usual)
     if found["tolerance"] <= 0:
         what = f"tolerance = {found['tolerance']:g} is not positive"
         raise InputError(what, table.at("tolerance"), "give more than 0")
@@ -203,9 +202,9 @@ def _curve(table: TomlTable, kind: str, supplies: Supplies) -> list[Target]:
     points = table.take("points", tuple[tuple[float, float], ...])
     if len(points) < 2:
         raise InputError("one point is no curve", table.at("points"), "write [[-15, -20], [30, 40]]")
-    if "pressure_kPa" not in KINDS[kind].takes:
+    if AT not in KINDS[kind].takes:
         raise InputError(f"{kind} has no curve", table.at("points"), "give a value")
-    _refuse(table, ("value", "low", "high", "objective", "pressure_kPa"), "points give it already")
+    table.without(("value", "low", "high", "objective", "pressure_kPa"), "points give it already")
     rest = {key: v for key, v in table.values.items() if key not in ("points", "name")}
     return [
         target
@@ -216,84 +215,83 @@ def _curve(table: TomlTable, kind: str, supplies: Supplies) -> list[Target]:
     ]
 
 
-def _quantity(kind: str, name: str, table: TomlTable, supplies: Supplies) -> Quantity | None:
-    if kind == "printable":
-        return None
-    if kind == "mass":
-        return Mass(name, supplies.density_g_per_ml, supplies.printer, body=supplies.body)
-    if kind == "print_time":
-        return PrintTime(name, supplies.printer)
-    if kind == "wall_thickness":
-        return WallThickness(name)
-    if kind == "stiffness":
-        return RestStiffness(name, table.word("direction", ("x", "y", "z")))
-    if kind == "workspace":
-        return Workspace(name, _pressures(table))
-    if kind in ("deviation", "sensor_slope"):
-        pressures, path = _pressures(table), table.values.get("path")
-        if path is None and supplies.path_is_free:
-            path = ""
-        elif path not in supplies.paths:
+@attrs.frozen
+class _Asked:
+    """The table of a target: the values of its quantity, which raise InputError."""
+
+    table: TomlTable
+    kind: str
+    name: str
+    supplies: Supplies
+
+    def pressure(self, rest: bool = False, default: Any = attrs.NOTHING) -> float:
+        """A pressure in kPa. rest: it may be 0."""
+        found = float(self.table.number(AT, PRESSURE.low, PRESSURE.high, default))
+        if found == 0 and not rest:
             raise InputError(
-                f"path = {path!r} is not a path of the unit", table.at("path"),
-                f"one of: {', '.join(supplies.paths)}; left out where the path is a freedom",
+                f"{self.kind} at 0 kPa is that of the unit at rest", self.table.at(AT),
+                "give another; with orientation_deg, under its weight, an angle or a tip position may be at "
+                "0",
             )  # fmt: skip
-        made = Disturbance if kind == "deviation" else SensorSlope
-        return made(name, str(path), pressures)
-    pressure = 0.0 if kind == "air_volume" and "pressure_kPa" not in table else _pressure(table)
-    if kind == "air_volume":
-        return AirVolume(name, pressure)
-    if pressure == 0 and not (supplies.has_gravity and kind in ("angle", "tip_position")):
-        raise InputError(
-            f"{kind} at 0 kPa is that of the unit at rest", table.at("pressure_kPa"),
-            "give another; with orientation_deg, under its weight, an angle or a tip position may be at 0",
-        )  # fmt: skip
-    if kind == "angle":
-        return Angle(name, pressure)
-    if kind == "tip_force":
-        return _tip_force(name, pressure, table)
-    if kind == "tip_position":
-        direction = table.values.get("direction", "y")
-        if direction not in ("y", "z"):
-            raise InputError(
-                f"the tip does not move in direction = {direction!r}", table.at("direction"),
-                'write "y", toward which it bends, or "z", along the axis',
-            )  # fmt: skip
-        return TipPosition(name, pressure, str(direction))
-    if kind == "walls_apart":
-        return WallsApart(name, pressure)
-    region = table.word("region", ("wall", "struts"), "wall")
-    return Stretch(name, pressure, region, supplies.elongation if kind == "safety" else None)
+        return found
+
+    @property
+    def bent(self) -> float:
+        """A pressure in kPa that bends the unit, or 0 where its weight does."""
+        return self.pressure(self.supplies.has_gravity)
+
+    @property
+    def pressures(self) -> tuple[float, ...]:
+        """Pressures in kPa, without 0."""
+        given = self.table.take(OVER, tuple[float, ...])
+        bounded = (self.table.bounded(OVER, p, PRESSURE.low, PRESSURE.high) for p in given)
+        found = tuple(sorted({*bounded} - {0.0}))
+        if not found:
+            raise InputError("no pressure differs from 0", self.table.at(OVER), "give one")
+        return found
+
+    @property
+    def path(self) -> str:
+        """A path of the unit, "" where it is free."""
+        free = "" if self.supplies.path_is_free else attrs.NOTHING
+        return str(self.table.word("path", tuple(self.supplies.paths), free))
+
+    @property
+    def region(self) -> str:
+        """Wall or struts."""
+        return str(self.table.word("region", ("wall", "struts"), "wall"))
 
 
-def _tip_force(name: str, pressure: float, table: TomlTable) -> TipForce:
-    gap = table.number("gap_mm", 0.0, GAP.high, 0.0)
-    if pressure < 0:
+def _tip_force(asked: _Asked) -> TipForce:
+    if asked.pressure() < 0:
         raise InputError(
-            "the wall is on the side toward which pressure bends the unit", table.at("pressure_kPa"),
+            "the wall is on the side toward which pressure bends the unit", asked.table.at("pressure_kPa"),
             "give a pressure above 0",
         )  # fmt: skip
-    return TipForce(name, pressure, gap)
+    return TipForce(
+        asked.name, asked.pressure(), asked.table.number(GAP.name, GAP.low, GAP.high, GAP.default)
+    )
 
 
-def _refuse(table: TomlTable, keys: Sequence[str], why: str) -> None:
-    for key in keys:
-        if key in table:
-            raise InputError(f"{why}: {key} does not apply there", table.at(key), "leave it out")
+def _tip_position(asked: _Asked) -> TipPosition:
+    return TipPosition(asked.name, asked.bent, asked.table.word("direction", ("y", "z"), "y"))
 
 
-def _pressures(table: TomlTable) -> tuple[float, ...]:
-    given = table.take("pressures_kPa", tuple[float, ...])
-    bounded = (table.bounded("pressures_kPa", p, PRESSURE.low, PRESSURE.high) for p in given)
-    found = tuple(sorted({*bounded} - {0.0}))
-    if not found:
-        raise InputError("no pressure differs from 0", table.at("pressures_kPa"), "give one")
-    return found
-
-
-def _pressure(table: TomlTable) -> float:
-    return float(table.number("pressure_kPa", PRESSURE.low, PRESSURE.high))
-
-
-def _number(table: TomlTable, key: str, default: Any = attrs.NOTHING) -> float:
-    return float(table.number(key, default=default))
+_MADE: dict[str, Callable[[_Asked], Quantity | None]] = {
+    "angle": lambda a: Angle(a.name, a.bent),
+    "tip_force": _tip_force,
+    "tip_position": _tip_position,
+    "workspace": lambda a: Workspace(a.name, a.pressures),
+    "stiffness": lambda a: RestStiffness(a.name, a.table.word("direction", AXES)),
+    "stretch": lambda a: Stretch(a.name, a.pressure(), a.region),
+    "safety": lambda a: Stretch(a.name, a.pressure(), a.region, a.supplies.elongation),
+    "air_volume": lambda a: AirVolume(a.name, a.pressure(rest=True, default=0.0)),
+    "mass": lambda a: Mass(a.name, a.supplies.density_g_per_ml, a.supplies.printer, body=a.supplies.body),
+    "print_time": lambda a: PrintTime(a.name, a.supplies.printer),
+    "wall_thickness": lambda a: WallThickness(a.name),
+    "deviation": lambda a: Disturbance(a.name, a.path, a.pressures),
+    "sensor_slope": lambda a: SensorSlope(a.name, a.path, a.pressures),
+    "walls_apart": lambda a: WallsApart(a.name, a.pressure()),
+    "printable": lambda a: None,
+}
+"""The quantity of a target's table, by its kind."""

@@ -10,7 +10,7 @@ import numpy as np
 from ..chain import ChainState, Shape
 from ..meshing.mesh import LATTICE, MEMBRANE
 from . import plots
-from .render import Camera, Part, fit, png, render
+from .render import Part, framed, png, render
 from .results import Picture
 from .shapes import ball
 from .unit_pictures import LATTICE_COLOR, MEMBRANE_COLOR, WHITE, region_skin
@@ -57,8 +57,7 @@ def pictures(
         scenes.append(parts)
     every = [part for scene in scenes for part in scene]
     up = _UP if hangs else (0.0, 0.0, 1.0)
-    aspect = _aspect(every, up)
-    camera = fit(every, _TOWARDS, up, aspect, margin=0.03)
+    camera, aspect = framed(every, _TOWARDS, up, margin=0.03)
     found = []
     for scene, (name, number) in zip(scenes, moments(states), strict=True):
         state = states[number]
@@ -68,12 +67,6 @@ def pictures(
         words = f"The chain of {len(shape.meshes)} units, {name}"
         found.append((f"chain_{name.replace(' ', '_')}.png", Picture(png(image), caption, words)))
     return found
-
-
-def _aspect(parts: list[Part], up: tuple[float, float, float]) -> float:
-    axes = Camera((0, 0, 0), _TOWARDS, up, 1.0).axes
-    extent = np.ptp(np.vstack([np.asarray(part.vertices) for part in parts]) @ axes.T, axis=0)
-    return float(np.clip(extent[0] / extent[1], 0.35, 2.5))
 
 
 def over_time(time_s: Array, values: dict[str, Array], label: str, error: Array | None = None) -> str:

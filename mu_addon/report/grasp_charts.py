@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from typing import Any
 
 import numpy as np
@@ -11,8 +11,9 @@ from ..design.gripper import ROOT, Gripper, GripperSolid
 from ..grasp import Grasp
 from ..meshing.mesh import Mesh
 from . import plots
-from .render import Camera, Cut, Part, fit, png, render
+from .render import Cut, Part, framed, png, render
 from .results import Picture
+from .shapes import box
 from .unit_pictures import COLORS, WHITE, skins_of, unit_parts
 
 Array = np.ndarray[Any, Any]
@@ -22,16 +23,6 @@ CUBE_COLOR = (0.0, 0.45, 0.70)  # plots.BY_LENGTH[0]
 # The gripper hangs: its tips, along +z, are down.
 HANGING = (0.0, 0.0, -1.0)
 OF_CUBE = (plots.BY_LENGTH[0], plots.CHOSEN, *plots.BY_LENGTH[1:])
-_BOX = np.array([[0, 2, 3, 1], [4, 5, 7, 6], [0, 1, 5, 4], [2, 6, 7, 3], [0, 4, 6, 2], [1, 3, 7, 5]])
-
-
-def box(low: Any, high: Any) -> tuple[Array, Array]:
-    """Vertices (8, 3) and outward triangles (12, 3) of a box between two corners (3,) in mm."""
-    low, high = np.asarray(low, float), np.asarray(high, float)
-    corners = np.array(
-        [[(low, high)[b][a] for a, b in enumerate((i, j, k))] for i, j, k in np.ndindex(2, 2, 2)]
-    )
-    return corners, np.concatenate([_BOX[:, [0, 1, 2]], _BOX[:, [0, 2, 3]]])[:, ::-1]
 
 
 def part_picture(gripper: Gripper, solid: GripperSolid, width: int = 1000) -> Picture:
@@ -46,17 +37,10 @@ def part_picture(gripper: Gripper, solid: GripperSolid, width: int = 1000) -> Pi
     parts = [Part(vertices, part.faces, part.color) for part in fingers]
     parts.append(Part(vertices, triangles[plate], PLATE_COLOR))
     cut = Cut((0.0, 0.0, 0.0), (1.0, 0.0, 0.0), color=(0.95, 0.86, 0.72))
-    camera, aspect = _framed(parts, (1.0, 0.28, -0.35))
+    camera, aspect = framed(parts, (1.0, 0.28, -0.35), HANGING, margin=0.02)
     image = render(parts, camera, width, round(width / aspect), cut=cut, background=WHITE)
     caption = "The printable part cut open, as it hangs: two units on their plate, tips down."
     return Picture(png(image), caption, "Two units hanging from a base plate, their lattice sides inward")
-
-
-def _framed(parts: Sequence[Part], towards: tuple[float, float, float]) -> tuple[Camera, float]:
-    axes = Camera((0, 0, 0), towards, HANGING, 1.0).axes
-    extent = np.ptp(np.vstack([np.asarray(part.vertices) for part in parts]) @ axes.T, axis=0)
-    aspect = float(extent[0] / extent[1])
-    return fit(parts, towards, HANGING, aspect, margin=0.02), aspect
 
 
 def frames(gripper: Gripper, mesh: Mesh, found: Grasp, width: int = 420) -> list[Picture]:
@@ -82,7 +66,9 @@ def frames(gripper: Gripper, mesh: Mesh, found: Grasp, width: int = 420) -> list
         middle = found.cube_mm[number] + gripper.placements[0][1]
         parts.append(Part(*box(middle - half, middle + half), CUBE_COLOR))
         scenes.append(parts)
-    camera, aspect = _framed([part for scene in scenes for part in scene], (1.0, 0.16, -0.12))
+    camera, aspect = framed(
+        [part for scene in scenes for part in scene], (1.0, 0.16, -0.12), HANGING, margin=0.02
+    )
     pictures = []
     for scene, (number, words) in zip(scenes, moments.values(), strict=True):
         image = render(scene, camera, width, round(width / aspect), background=WHITE)
@@ -103,15 +89,12 @@ def _opened(found: Grasp) -> int:
     return min(own, key=lambda i: found.pressure_kPa[i])
 
 
-def over_time(
-    grasps: Mapping[float, Grasp], values: Mapping[float, Array], label: str, zero: bool = True
-) -> str:
+def over_time(grasps: Mapping[float, Grasp], values: Mapping[float, Array], label: str) -> str:
     """A line a cube against time, phases marked above, as SVG text."""
     with plots.canvas(plots.WIDTH, 2.7) as (figure, svg):
         axes = figure.add_axes((0.15, 0.17, 0.81, 0.70))
         first = next(iter(grasps.values()))
-        if zero:
-            axes.axhline(0, color=plots.QUIET, linewidth=0.8)
+        axes.axhline(0, color=plots.QUIET, linewidth=0.8)
         for name in dict.fromkeys(first.phase):
             own = [i for i, phase in enumerate(first.phase) if phase == name]
             start, end = first.time_s[max(0, own[0] - 1)], first.time_s[own[-1]]

@@ -18,6 +18,7 @@ from .heatmaps import MAP
 from .plots import BY_LENGTH, CHOSEN, INK, QUIET, WIDTH, canvas
 from .render import Camera, Floats, Image, Part, fit, png, render
 from .results import Picture
+from .shapes import box, tube
 from .unit_pictures import WHITE, skin
 
 STRUT_COLOR = (0.62, 0.69, 0.77)
@@ -51,8 +52,6 @@ def cell_picture(nodes: Floats, faces: Any, size: float, density: float, width: 
 
 def _frame(size: float) -> list[Part]:
     """The edges of a cell's box as thin rods."""
-    from .shapes import tube
-
     radius = 0.006 * size
     found = []
     for axis in range(3):
@@ -78,7 +77,6 @@ def modulus_surface(C: Floats, width: int = 620) -> Picture:
     color = colormaps[MAP](share)[:, :3]
     part = Part(directions * modulus[:, None], faces, color)
     reach = 1.15 * high
-    from .shapes import tube
 
     rods = [
         Part(*tube(np.array([-reach * e, reach * e]), 0.008 * reach, 8), PLATE_COLOR, whole=True)
@@ -164,65 +162,34 @@ def _with_scale(image: Image, low: float, high: float) -> bytes:
     return stream.getvalue()
 
 
-def specimen_pictures(
-    nodes: Floats,
-    faces: Any,
-    states: Sequence[tuple[float, Floats]],
-    planes: Floats,
-    width: int = 460,
-) -> list[Picture]:
-    """A specimen between its plates at some nominal strains, all to one scale.
-
-    nodes (n, 3) and skin faces (f, 3) of its eighth, whose mirror planes are at `planes` (3,); a state is
-    compressive strain and displacement (n, 3) in mm.
-    """
-    scenes = []
-    for _, u in states:
-        vertices, triangles = unfolded(nodes + u, faces, planes)
+def test_pictures(test: Compression) -> list[tuple[str, Picture]]:
+    """File name and picture of a test between its plates, at rest, half way and at its end, to one scale."""
+    nodes, last = test.specimen.mesh.nodes, test.states[-1]
+    faces = skin(test.specimen.mesh.tets)
+    middle = min(test.states, key=lambda s: abs(s.strain - last.strain / 2))
+    shown, scenes = (test.states[0], middle, last), []
+    for state in shown:
+        vertices, triangles = unfolded(np.asarray(nodes + state.u), faces, np.zeros(3))
         # The plates are where the outermost nodes of the loaded faces are.
         low, high = vertices[:, 2].min(), vertices[:, 2].max()
-        side = 1.12 * np.ptp(nodes[:, 0]) * 2
-        scenes.append(
-            [
-                Part(vertices, triangles, STRUT_COLOR),
-                *(_plate(planes, side, z, sign) for z, sign in ((low, -1), (high, 1))),
-            ]
-        )
+        half = 1.12 * np.ptp(nodes[:, 0])
+        thick = 0.04 * half
+        plates = [
+            Part(*box([-half, -half, z], [half, half, z + thick]), PLATE_COLOR) for z in (low - thick, high)
+        ]
+        scenes.append([Part(vertices, triangles, STRUT_COLOR), *plates])
     camera = fit([part for scene in scenes for part in scene], (1.0, -0.55, 0.22), margin=0.02)
     return [
-        Picture(
-            png(render(scene, camera, width, width, background=WHITE)),
-            "undeformed" if strain == 0 else f"at {strain:.0%} of nominal strain",
-            f"The specimen between two plates at {strain:.0%} strain.",
+        (
+            f"specimen_{100 * strain:.0f}.png",
+            Picture(
+                png(render(scene, camera, 460, 460, background=WHITE)),
+                "undeformed" if strain == 0 else f"at {strain:.0%} of nominal strain",
+                f"The specimen between two plates at {strain:.0%} strain.",
+            ),
         )
-        for scene, (strain, _) in zip(scenes, states, strict=True)
+        for scene, strain in zip(scenes, (state.strain for state in shown), strict=True)
     ]
-
-
-def test_pictures(test: Compression) -> list[tuple[str, Picture]]:
-    """File name and picture of a test at rest, half way and at its end."""
-    mesh, last = test.specimen.mesh, test.states[-1]
-    middle = min(test.states, key=lambda s: abs(s.strain - last.strain / 2))
-    states = [(s.strain, s.u) for s in (test.states[0], middle, last)]
-    made = specimen_pictures(mesh.nodes, skin(mesh.tets), states, np.zeros(3))
-    return [(f"specimen_{100 * e:.0f}.png", p) for (e, _), p in zip(states, made, strict=True)]
-
-
-def _plate(middle: Floats, side: float, z: float, outward: int) -> Part:
-    """A flat plate square to z."""
-    x, y = middle[:2]
-    thick = 0.02 * side
-    near, far = sorted((z, z + outward * thick))
-    corners = np.array(
-        [
-            [x + i * side / 2, y + j * side / 2, k]
-            for k in (near, far)
-            for i, j in ((-1, -1), (1, -1), (1, 1), (-1, 1))
-        ]
-    )
-    quads = [[3, 2, 1, 0], [4, 5, 6, 7], [0, 1, 5, 4], [1, 2, 6, 5], [2, 3, 7, 6], [3, 0, 4, 7]]
-    faces = np.array([t for a, b, c, d in quads for t in ([a, b, c], [a, c, d])])
-    return Part(corners, faces, PLATE_COLOR)
 
 
 @attrs.frozen(eq=False)

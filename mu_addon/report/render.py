@@ -95,6 +95,16 @@ def fit(
     return Camera(0.5 * (low + high) @ axes, towards, up, max(height, width / aspect) / (1.0 - 2.0 * margin))
 
 
+def framed(
+    parts: Sequence[Part], towards: Any, up: Any = (0.0, 0.0, 1.0), margin: float = 0.04
+) -> tuple[Camera, float]:
+    """The camera of `fit` for a picture of the parts' own width over height, within 0.35 to 2.5; and that."""
+    axes = Camera((0, 0, 0), towards, up, 1.0).axes
+    width, height = np.ptp(np.vstack([np.asarray(p.vertices) for p in parts]) @ axes.T, axis=0)[:2]
+    aspect = float(np.clip(width / height, 0.35, 2.5))
+    return fit(parts, towards, up, aspect, margin), aspect
+
+
 def render(
     parts: Sequence[Part],
     camera: Camera,

@@ -7,6 +7,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from ..design.block import FACES, Block
+
 Mesh = tuple[NDArray[np.float64], NDArray[np.int64]]
 
 
@@ -52,6 +54,13 @@ def ball(center: ArrayLike, radius: float, sides: int = 24) -> Mesh:
     middle = np.asarray(center, float)
     short = np.array([0.0, 0.0, 1e-3 * radius])
     return tube([middle - short, middle + short], radius, sides)
+
+
+def box(low: ArrayLike, high: ArrayLike) -> Mesh:
+    """Corners (8, 3) and outward faces (12, 3) of a box between two corners (3,)."""
+    a, b = np.asarray(low, float), np.asarray(high, float)
+    block = Block((a + b) / 2.0, np.eye(3), (b - a) / 2.0)
+    return block.corners, np.concatenate([FACES[:, [0, 1, 2]], FACES[:, [0, 2, 3]]])
 
 
 def _carried(tangents: NDArray[Any]) -> NDArray[np.float64]:

@@ -11,7 +11,7 @@ from ..design.dimensions import Dimensions
 from ..design.profile import outer_radius
 from ..design.rigid_body import RigidBody
 from ..meshing.mesh import LATTICE, MEMBRANE, Mesh, boundary_faces
-from .render import Camera, Cut, Floats, Image, Part, fit, png, render
+from .render import Camera, Cut, Floats, Image, Part, framed, png, render
 from .results import Picture, SideView
 from .shapes import ball, tube
 
@@ -70,10 +70,7 @@ def _framed(parts: Sequence[Part], towards: tuple[float, float, float]) -> tuple
     """Camera that frames `parts` after that cut, and the aspect they fill."""
     behind = np.array([0.0, np.inf, np.inf])
     left = [part if part.whole else Part(np.minimum(part.vertices, behind), part.faces) for part in parts]
-    axes = Camera((0, 0, 0), towards, (0, 0, 1), 1.0).axes
-    extent = np.ptp(np.vstack([part.vertices for part in left]) @ axes.T, axis=0)
-    aspect = float(extent[0] / extent[1])
-    return fit(left, towards, aspect=aspect, margin=0.015), aspect
+    return framed(left, towards, margin=0.015)
 
 
 def motion(

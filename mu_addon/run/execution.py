@@ -57,8 +57,7 @@ class Execution:
         self._shown_s = 0.0
         self._growth: dict[str, tuple[Growth, Sequence[Any]]] = {}
         of = {name: self._stages[name].over for name in self.results.members}
-        self._may_grow = {name for name, over in of.items() if over and over.grows}
-        self.results.growing = set(self._may_grow)
+        self.results.growing = {name for name, over in of.items() if over and over.grows}
         self._waiting: list[Task] = []
         self._running: dict[Future[None], Task] = {}
         self._begin_growth()
@@ -83,7 +82,8 @@ class Execution:
             (self._stages[name].title_of(member) if members else self._stages[name].title, name)
             for name, members in self.results.members.items()
             if self._stages[name].title
-            for member in members or [None] * (name in self._may_grow)
+            # A set that grows may have no member yet.
+            for member in members or [None] * (name in self.results.growing)
         ]
         return [(title, {name for _, name in of}) for title, of in groupby(titled, lambda one: one[0])]
 

@@ -52,6 +52,11 @@ class Sentence:
     found: bool = False
 
 
+def echo(*lines: str) -> list[Sentence]:
+    """Lines at the end of a command, which the report leaves out."""
+    return [Sentence(line, terminal=True, page=False) for line in lines]
+
+
 @attrs.frozen
 class Table:
     """A table of texts.

@@ -8,7 +8,7 @@ from pathlib import Path
 import attrs
 
 from .. import sensing
-from ..run.parts import Chart, Fact, File, Part, Sentence, Table, csv, recorded
+from ..run.parts import Chart, Fact, File, Part, Sentence, Table, csv, echo, recorded
 from ..run.study import Node, ReadInput, Study, given, intermediate, section, setting, stage
 from ..sensing.settings import ANGLES, CHANNEL, DARK
 from .inputs import PlaceInput, asked
@@ -109,8 +109,7 @@ class Calibrate(Study):
                 f"Between {blind[0]:.0f} and {blind[1]:.0f} degrees the voltage is nearly constant: the "
                 "sensor cannot resolve the angle there."
             )
-        for line in lines:
-            yield Sentence(line, terminal=True, page=False)
+        yield from echo(*lines)
         names = ", ".join(p.name for p in self.data)
         words = f"{found.sweeps} sweeps, {low:.1f} to {high:.1f} degrees, from {names}"
         yield File("calibration.toml", lambda path: sensing.write_calibration(path, found, words))

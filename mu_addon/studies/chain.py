@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from pathlib import Path
 from typing import Any
 
@@ -14,7 +14,7 @@ from ..chain.settings import GRAVITY, ORIENTATION, REFINE, TIMES, TIP_MASS
 from ..design.quantity import described
 from ..design.settings import USUAL_RESIN
 from ..errors import InputError
-from ..run.parts import Beside, Chart, Fact, File, Part, Pictures, Sentence, Table, Warn, csv, recorded
+from ..run.parts import Beside, Chart, Fact, File, Part, Pictures, Sentence, Table, Warn, csv, echo, recorded
 from ..run.study import (
     Found,
     Input,
@@ -31,7 +31,7 @@ from ..run.study import (
     stage,
 )
 from ..toml_reader import TomlTable
-from .inputs import NumbersInput
+from .inputs import FileInput, NumbersInput
 
 JOINT_S = 289.0
 """Seconds in which a joint is learned at one pressure on the default mesh."""
@@ -120,16 +120,12 @@ def _unit(entry: TomlTable, folder: Path) -> ChainUnit:
 
 
 @attrs.frozen
-class PressuresInput(Input):
-    """Pressures of the units over time, in a file."""
+class PressuresInput(FileInput):
+    """Pressures of the units over time."""
 
     kind: str = "pressures"
-
-    def write(self, name: str, value: chain.Pressures | None) -> Written:
-        """Its name and the file."""
-        if value is None:
-            return Written()
-        return Written({name: f"{name}.csv"}, files={f"{name}.csv": value.text()})
+    file: str = "{name}.csv"
+    text: Callable[[Any], str] = lambda pressures: pressures.text()
 
     def read(self, name: str, found: Found) -> chain.Pressures | None:
         """The pressures of the file, or None; raises InputError."""
@@ -137,10 +133,6 @@ class PressuresInput(Input):
         if named is None or "reach" in found.replaced:
             return None
         return chain.read_pressures(found.path.parent / named, len(found.given["units"]))
-
-    def file_names(self, name: str) -> tuple[str, ...]:
-        """Its file."""
-        return (f"{name}.csv",)
 
 
 @attrs.frozen
@@ -372,8 +364,7 @@ class Chain(Study):
             f"{one.error_mm:.2f} mm": None
             for one in shape.learned
         }
-        for line in lines:
-            yield Sentence(line, terminal=True, page=False)
+        yield from echo(*lines)
         last, largest = motion.states[-1], max(state.angle_deg for state in motion.states)
         mass = sum(found.joint.mass_g for found in shape.learned)
         x, y, z = last.tip_mm
@@ -435,11 +426,9 @@ class Chain(Study):
         ]  # fmt: skip
         yield csv("tip.csv", [*columns, "used_range"], [[f"{v:.9g}" for v in row] for row in rows])
         *rest, last = (", ".join(f"{v:.1f}" for v in s.tip_mm) for s in (motion.rest, motion.states[-1]))
-        yield Sentence(
+        yield from echo(
             f"tip of {len(units)} units at ({last}) mm, {motion.states[-1].angle_deg:.1f} deg; at rest "
-            f"({rest[0]}) mm",
-            terminal=True,
-            page=False,
+            f"({rest[0]}) mm"
         )
 
         angles = {"tip against base": np.array([state.angle_deg for state in motion.states])}
@@ -489,7 +478,7 @@ class Chain(Study):
             "its bound cannot change further."
         )
         shown = ", ".join(f"{p:.4g}" for p in found.pressures_kPa)
-        yield Sentence(f"target missed by {found.miss_mm:.3g} mm, at {shown} kPa", terminal=True, page=False)
+        yield from echo(f"target missed by {found.miss_mm:.3g} mm, at {shown} kPa")
         yield Table(
             "",
             [("unit", ""), ("kPa", "n"), ("at its bound", "")],

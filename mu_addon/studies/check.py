@@ -15,7 +15,20 @@ from ..design.settings import PRINTER, QUALITY, UP
 from ..errors import InputError
 from ..files import json_text
 from ..run.inputs import digest, named_path, require_digest
-from ..run.parts import Beside, Chart, Fact, Fault, File, Part, Pictures, Sentence, Table, Warn, recorded
+from ..run.parts import (
+    Beside,
+    Chart,
+    Fact,
+    Fault,
+    File,
+    Part,
+    Pictures,
+    Sentence,
+    Table,
+    Warn,
+    echo,
+    recorded,
+)
 from ..run.study import Found, Input, Node, Study, Tell, Written, given, intermediate, section, setting, stage
 from .inputs import NumbersInput, OnceInput, PrinterInput, UnitInput, WindowInput, asked
 
@@ -394,8 +407,7 @@ class Check(Study):
                 f"best build direction ({towards}): {best.islands} islands, {best.support_mm2:.0f} mm2 to "
                 f"support, of it {best.inner_mm2:.0f} mm2 in chambers, cups of {best.cup_ml:.2g} ml"
             )
-        for line in lines:
-            yield Sentence(line, terminal=True, page=False)
+        yield from echo(*lines)
 
     @section("repair", "Repair")
     def repaired(self, part: Surface) -> Iterator[Part]:

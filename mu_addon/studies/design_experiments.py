@@ -13,7 +13,7 @@ from ..design.quantity import described
 from ..errors import InputError
 from ..measured.kinds import NOISE, OF_A_UNIT
 from ..meshing.settings import SELF_CONTACT
-from ..run.parts import Part, Sentence, Table, Warn, csv, listed, recorded
+from ..run.parts import Part, Sentence, Table, Warn, csv, echo, listed, recorded
 from ..run.study import Found, Input, Study, Tell, Written, derived, given, section, setting, stage
 from .inputs import MeasuredInput, UnitInput
 
@@ -221,8 +221,7 @@ class DesignExperiments(Study):
         lines += [
             f"similar signatures: {readable(a)} and {readable(b)} ({c:.3f})" for a, b, c in found.alike[:5]
         ]
-        for line in lines:
-            yield Sentence(line, terminal=True, page=False)
+        yield from echo(*lines)
 
     @section("limits", "Detectable effects")
     def limits(self, found: Plan) -> Iterator[Part]:

@@ -13,7 +13,7 @@ from ..design.settings import FINE, USUAL_RESIN
 from ..errors import InputError, MeshingError, OutputError, did_you_mean
 from ..files import json_text
 from ..run.inputs import digest, named_path, require_digest
-from ..run.parts import Fact, File, Part, Sentence, Table, Warn, recorded
+from ..run.parts import Fact, File, Part, Sentence, Table, Warn, echo, recorded
 from ..run.study import (
     Found,
     Input,
@@ -409,7 +409,7 @@ class Export(Study):
         for one in files:
             mb, back = f"{len(one.content) / 1e6:.2f}", one.read_back
             yield File(one.name, one.written)
-            yield Sentence(f"{one.name}: {mb} MB, read back and verified", terminal=True, page=False)
+            yield from echo(f"{one.name}: {mb} MB, read back and verified")
             error = f"{back['volume_error']:+.1e}" if "volume_error" in back else "-"
             volume = back.get("volume_mm3", back.get("frusta_mm3"))
             rows.append((one.name, one.what, mb, "-" if volume is None else f"{volume:.2f}", error))
@@ -425,7 +425,7 @@ class Export(Study):
             refused.append({"format": name, "why": why, "what_to_do": remedy})
             yield Warn(text, repeated=False)
             yield Sentence(text, note=True)
-            yield Sentence(f"not written: {name}: {why}", terminal=True, page=False)
+            yield from echo(f"not written: {name}: {why}")
         manifest = self._manifest(part, material, next(iter((vents or {}).values()), None))
         order = [one for one in _ASSEMBLY if one[0] in {file.name for file in files}]
         steps = [{"order": n, "file": name, "how": how} for n, (name, how) in enumerate(order, 1)]
@@ -435,7 +435,7 @@ class Export(Study):
             yield recorded(key, value)
         resin = manifest["resin"]
         text = f"{resin['ml']:.2f} ml, {resin['g']:.1f} g of {resin['name']}"
-        yield Sentence(text, terminal=True, page=False)
+        yield from echo(text)
         if steps:
             head = [("", "n"), ("file", ""), ("how", "text")]
             yield Table("Assembly of the STEP files in CAD", head, [(*map(str, s.values()),) for s in steps])

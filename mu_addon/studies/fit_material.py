@@ -13,7 +13,7 @@ from .. import materials, measured
 from ..design.declared_laws import form_names
 from ..errors import InputError
 from ..materials.settings import WEIGHTS
-from ..run.parts import Beside, Chart, Fact, File, Part, Sentence, Table, Warn, csv, listed, recorded
+from ..run.parts import Beside, Chart, Fact, File, Part, Sentence, Table, Warn, csv, echo, listed, recorded
 from ..run.study import Members, Over, Study, derived, given, intermediate, section, setting, stage
 from .inputs import MeasuredInput, WordsInput, asked
 
@@ -186,7 +186,7 @@ class FitMaterial(Study):
             f"not tested: {', '.join(fitting.apart)}" if fitting.apart else "",
         ):
             if line:
-                yield Sentence(line, terminal=True, page=False)
+                yield from echo(line)
         head = "Fitted by fit-material; fit-material.toml names the data."
         yield File("material.toml", lambda path: materials.material_text(self._material(data, fitting), head))
         yield from _recorded(fitting, self.weights)

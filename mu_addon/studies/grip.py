@@ -14,7 +14,7 @@ from ..design.settings import FRICTION, QUALITY
 from ..errors import InputError, OutputError
 from ..grasp.settings import BEYOND, DENSITY, STEP_S
 from ..meshing.settings import REFINE, SELF_CONTACT
-from ..run.parts import Beside, Chart, Fact, File, Part, Pictures, Sentence, Table, Warn, csv, recorded
+from ..run.parts import Beside, Chart, Fact, File, Part, Pictures, Sentence, Table, Warn, csv, echo, recorded
 from ..run.study import (
     Found,
     Input,
@@ -22,7 +22,6 @@ from ..run.study import (
     Over,
     Study,
     Tell,
-    Written,
     derived,
     given,
     intermediate,
@@ -53,22 +52,17 @@ COLUMNS = (
 
 
 @attrs.frozen
-class GripperInput(Input):
-    """A gripper, in a file of its own; its unit in another one."""
+class GripperInput(FileInput):
+    """A gripper; its unit is in another file."""
 
     kind: str = "gripper"
+    load: Callable[[Path], Any] = lambda path: design.read_gripper(path)
 
-    def write(self, name: str, value: design.Gripper) -> Written:
-        """Both files, and the name of the first."""
+    def texts(self, name: str, value: design.Gripper) -> dict[str, str]:
+        """Texts of both files."""
         from ..design.gripper import to_toml
 
-        file = f"{name}.toml"
-        return Written({name: file}, files={file: to_toml(value, UNIT), UNIT: design.to_toml(value.unit)})
-
-    def read(self, name: str, found: Found) -> design.Gripper:
-        """The gripper of the folder; raises InputError."""
-        found.keys.pop(name, None)
-        return design.read_gripper(found.path.parent / f"{name}.toml")
+        return {f"{name}.toml": to_toml(value, UNIT), UNIT: design.to_toml(value.unit)}
 
     def file_names(self, name: str) -> tuple[str, ...]:
         """Both files."""
@@ -339,7 +333,7 @@ class Grip(Study):
         if grasps:
             yield recorded("grasps", {f"{s:g}": figures_of(g) for s, g in grasps.items()})
         size = f"{x:g} x {y:g} x {z:.4g} mm"
-        yield Sentence(f"one part of {size}, {part.gates.inner_shells} chambers", terminal=True, page=False)
+        yield from echo(f"one part of {size}, {part.gates.inner_shells} chambers")
         yield File("gripper.stl", lambda path: design.stl_bytes(part.vertices, part.triangles))
         yield File("gripper.3mf", lambda path: _threemf(gripper.name, part))
         shown = [Fact("part", size, size), Fact("resin", 0, f"{part.gates.volume_mm3 / 1e3:.3g} ml")]
@@ -348,10 +342,8 @@ class Grip(Study):
             angle, force, lift = g.angle_deg[g.end("iii")], g.normal_N[g.end("iii")], g.lift
             shown.append(Fact(f"{side:g} mm, plateau", angle, f"{angle:.1f}°, {force:.2f} N"))
             hung = f"held, {lift.margin:.3g} times its weight" if lift.held else "not lifted"
-            yield Sentence(
-                f"cube of {side:g} mm: {angle:.1f} deg and {force:.3g} N a finger at the plateau, {hung}",
-                terminal=True,
-                page=False,
+            yield from echo(
+                f"cube of {side:g} mm: {angle:.1f} deg and {force:.3g} N a finger at the plateau, {hung}"
             )
             words.append(
                 f"The cube of {side:g} mm is lifted: friction can carry {lift.margin:.1f} times its weight."

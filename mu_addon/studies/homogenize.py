@@ -11,7 +11,7 @@ from .. import design, fem, homogenize, meshing
 from ..design.quantity import described
 from ..errors import InputError
 from ..meshing.settings import REFINE
-from ..run.parts import Beside, Chart, Fact, File, Part, Pictures, Sentence, Table, Warn, csv, recorded
+from ..run.parts import Beside, Chart, Fact, File, Part, Pictures, Sentence, Table, Warn, csv, echo, recorded
 from ..run.study import (
     Dropped,
     Members,
@@ -223,15 +223,9 @@ class Homogenize(Study):
         cell: design.StrutCell,
         resin: Resin,
         documents: str,
-    ) -> homogenize.Effective:
-        """The lattice's moduli and law with their origin."""
-        from ..homogenize.effective_file import effective
-
-        e = elasticity
-        described_cell = cell_table(cell)
-        return effective(
-            fit, (e.C11, e.C12, e.C44), e.relative_density, described_cell, attrs.asdict(resin), documents
-        )
+    ) -> str:
+        """The lattice's moduli and law with their origin, as effective.toml has them."""
+        return homogenize.effective_text(fit, elasticity, cell_table(cell), attrs.asdict(resin), documents)
 
     # The block between plates.
 
@@ -355,11 +349,9 @@ class Homogenize(Study):
             answer=True,
             strong=kPa(1e3 * e.E100),
         )
-        yield Sentence(
+        yield from echo(
             f"Young's modulus {1e3 * e.E100:.4g} kPa along an axis of the cell, {1e3 * e.E111:.4g} kPa along "
-            f"a strut; relative density {e.relative_density:.4f}",
-            terminal=True,
-            page=False,
+            f"a strut; relative density {e.relative_density:.4f}"
         )
         words = []
         if tests:
@@ -467,7 +459,7 @@ class Homogenize(Study):
             yield recorded(f"specimen.{friction}.valid_to_strain", found.valid_to_strain)
             yield recorded(f"specimen.{friction}.why", found.why)
             shown = ", ".join(f"{name} {1e3 * value:.4g} kPa" for name, value in values.items())
-            yield Sentence(f"block between plates ({friction}): {shown}", terminal=True, page=False)
+            yield from echo(f"block between plates ({friction}): {shown}")
             for procedure, value in values.items():
                 needs = {"slope 0-40 %": 0.4, "secant at 40 %": 0.4, homogenize.DEFAULT: 0.1}.get(
                     procedure, 0.0
@@ -517,7 +509,7 @@ class Homogenize(Study):
         self,
         stretched: homogenize.Stretched,
         fit: homogenize.FoamFit | None = None,
-        effective: homogenize.Effective | None = None,
+        effective: str | None = None,
     ) -> Iterator[Part]:
         """The law beside the cell that it is fitted to."""
         curve = stretched.curve
@@ -534,7 +526,7 @@ class Homogenize(Study):
         if fit is None:
             return
         if effective is not None:
-            yield File("effective.toml", lambda path: effective.text())
+            yield File("effective.toml", lambda path: effective)
         yield recorded("law.misfit", attrs.asdict(fit.misfit))
         small = {"E_kPa": 1e3 * fit.E_MPa, "poisson": fit.poisson, "C44_kPa": 1e3 * fit.C44_MPa}
         yield recorded("law.small_strain", small)

@@ -11,7 +11,7 @@ from typing import Any
 import attrs
 
 from .. import design, evidence, materials, measured
-from ..design.quantity import described, in_kPa, in_MPa
+from ..design.quantity import Description, described, in_kPa, in_MPa
 from ..design.settings import USUAL_RESIN
 from ..errors import InputError
 from ..reading import text_in
@@ -28,12 +28,19 @@ def asked(of: type[Input], name: str, text: str, default: str = "", *, empty: An
     return given(of(descriptions=(described(name, default, text),), **more), default=empty)
 
 
+def once(described: Description, **more: Any) -> Any:
+    """attrs field of a setting that no run keeps; more: of its input."""
+    made = OnceInput(descriptions=(described,), **more)
+    return given(made, default=described.default, converter=described.checked)
+
+
 @attrs.frozen
 class FileInput(Input):
     """A value in a file of its own beside the inputs; None is none.
 
     file: its name, "{name}" in it for that of the input; text: of a value; load: the value of a file, raises
-    InputError; needed: there is always one.
+    InputError; needed: there is always one; usual: stands for None in the inputs. One in several files
+    overrides `texts` and `file_names`.
     """
 
     kind: str = "file"
@@ -41,24 +48,30 @@ class FileInput(Input):
     text: Callable[[Any], str] = str
     load: Callable[[Path], Any] = Path
     needed: bool = True
+    usual: str | None = None
 
     def made(self, values: tuple[Any, ...], given: Mapping[str, Any]) -> Any:
         """The value of the file that is named; raises InputError."""
         return self.load(Path(values[0])) if values[0] else None
 
     def write(self, name: str, value: Any) -> Written:
-        """The file's name, and its text."""
-        (file,) = self.file_names(name)
-        return Written() if value is None else Written({name: file}, files={file: self.text(value)})
+        """The file's name, and the texts."""
+        if value is None:
+            return Written({name: self.usual} if self.usual else {})
+        return Written({name: self.file_names(name)[0]}, files=self.texts(name, value))
+
+    def texts(self, name: str, value: Any) -> dict[str, str]:
+        """Texts of its files, by their names."""
+        return {self.file_names(name)[0]: self.text(value)}
 
     def read(self, name: str, found: Found) -> Any:
         """The value of the folder's file; raises InputError."""
-        if found.take(name, str, attrs.NOTHING if self.needed else None) is None:
+        if found.take(name, str, attrs.NOTHING if self.needed else self.usual) == self.usual:
             return None
         return self.load(found.path.parent / self.file_names(name)[0])
 
     def file_names(self, name: str) -> tuple[str, ...]:
-        """Its file."""
+        """Its file, or its files, the one that the inputs name first."""
         return (self.file.format(name=name),)
 
 
@@ -205,38 +218,24 @@ class ResinInput(Input):
 
 
 @attrs.frozen
-class MaterialInput(Input):
+class MaterialInput(FileInput):
     """A resin with all its figures, by a name of the library or a file; None stands for the usual one.
 
     So a window that writes inputs loads no library.
     """
 
     kind: str = "material"
+    text: Callable[[Any], str] = lambda resin: materials.material_text(resin)
+    load: Callable[[Path], Any] = lambda path: materials.read_material(path)
+    needed: bool = False
+    usual: str | None = USUAL_RESIN
 
     def made(self, values: tuple[Any, ...], given: Mapping[str, Any]) -> materials.Material | None:
         """The resin of a name or of a file; raises InputError."""
         (name,) = values
         if not name:
             return None
-        return (
-            materials.read_material(Path(name)) if name.endswith(".toml") else materials.load_material(name)
-        )
-
-    def write(self, name: str, value: materials.Material | None) -> Written:
-        """Its name, and its file unless it is the usual one."""
-        if value is None:
-            return Written({name: USUAL_RESIN})
-        return Written({name: f"{name}.toml"}, files={f"{name}.toml": materials.material_text(value)})
-
-    def read(self, name: str, found: Found) -> materials.Material | None:
-        """The resin that the file names; raises InputError."""
-        if found.keys.pop(name, USUAL_RESIN) == USUAL_RESIN:
-            return None
-        return materials.read_material(found.path.parent / f"{name}.toml")
-
-    def file_names(self, name: str) -> tuple[str, ...]:
-        """Its file."""
-        return (f"{name}.toml",)
+        return self.load(Path(name)) if name.endswith(".toml") else materials.load_material(name)
 
 
 @attrs.frozen

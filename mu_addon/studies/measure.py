@@ -16,7 +16,7 @@ from .. import measured, sensing
 from ..design.quantity import described
 from ..errors import InputError
 from ..run.inputs import digest
-from ..run.parts import Fact, Part, Sentence, Warn, recorded
+from ..run.parts import Fact, Part, Sentence, Warn, echo, recorded
 from ..run.study import Node, ReadInput, Study, derived, given, section, setting, stage
 from ..toml_writer import toml_text
 from .inputs import PlaceInput
@@ -138,7 +138,7 @@ class Measure(Study):
         yield Fact("angle", [least, most], f"{least:.1f} to {most:.1f} deg", "angle_deg")
         yield recorded("out_of_range", out)
         words = f"{len(angle)} rows, {low:.3g} to {high:.3g} kPa, {least:.1f} to {most:.1f} deg"
-        yield Sentence(words, terminal=True, page=False)
+        yield from echo(words)
         if out:
             yield Sentence(f"{out} rows are beyond the calibration, and have no angle", terminal=True)
 

@@ -15,21 +15,18 @@ from .. import evidence, optimization
 from ..design.quantity import described
 from ..errors import InputError
 from ..optimization.settings import BODY, DESIGN, RESIN, UNIT, WORKERS
-from ..run.parts import Beside, Chart, Fact, File, Part, Sentence, Table, Warn, csv, recorded
+from ..run.parts import Beside, Chart, Fact, File, Part, Sentence, Table, Warn, csv, echo, recorded
 from ..run.study import (
     Dropped,
-    Found,
-    Input,
     Over,
     Study,
-    Written,
     derived,
     given,
     grown,
     section,
     stage,
 )
-from .inputs import MODEL, ModelInput, OnceInput, SchedulerInput
+from .inputs import MODEL, FileInput, ModelInput, SchedulerInput, once
 
 FRONT = "front.png"
 SEARCH, CHECK = "search", "check of what is proposed"
@@ -73,27 +70,20 @@ def _seconds(study: Optimize, title: str) -> float:
 
 
 @attrs.frozen
-class DesignInput(Input):
-    """Targets and freedoms, in files of their own."""
+class DesignInput(FileInput):
+    """Targets and freedoms."""
 
     kind: str = "design"
+    file: str = DESIGN
+    load: Callable[[Path], Any] = lambda path: optimization.read_design(path)
     descriptions: tuple[Any, ...] = (
         described("file", "", "targets and freedoms, a design.toml: see docs/guide/search.md"),
     )
     argument: str = "FILE"
 
-    def made(self, values: tuple[Any, ...], given: Mapping[str, Any]) -> optimization.Design:
-        """The design of a file; raises InputError."""
-        return optimization.read_design(Path(values[0]))
-
-    def write(self, name: str, value: optimization.Design) -> Written:
-        """The file's name, and the texts of it and those beside it."""
-        return Written({name: DESIGN}, files=value.texts())
-
-    def read(self, name: str, found: Found) -> optimization.Design:
-        """The design of the folder; raises InputError."""
-        found.keys.pop(name, None)
-        return optimization.read_design(found.path.parent / DESIGN)
+    def texts(self, name: str, value: optimization.Design) -> dict[str, str]:
+        """Texts of it and those beside it."""
+        return value.texts()
 
     def file_names(self, name: str) -> tuple[str, ...]:
         """Its files."""
@@ -115,9 +105,7 @@ class Optimize(Study):
 
     design: optimization.Design = given(DesignInput())
     model: evidence.ExtendedModel | None = given(ModelInput(), default=None)
-    workers: int = given(
-        OnceInput(descriptions=(WORKERS,), metavar="N"), default=WORKERS.default, converter=WORKERS.checked
-    )
+    workers: int = once(WORKERS, metavar="N")
     scheduler: str = given(SchedulerInput(), default="")
 
     @property
@@ -231,14 +219,14 @@ class Optimize(Study):
         yield recorded("front", len(found.proposed))
         names, rows = [t.name for t in design.targets], []
         solved = sum(one.model_a for (*_, slopes), one in units.items() if slopes)
-        yield Sentence(f"{len(found.observed)} units computed, {solved} Model A's", terminal=True, page=False)
+        yield from echo(f"{len(found.observed)} units computed, {solved} Model A's")
         for place, c in verified.items():
             o = found.observed[found.some(MOST_CHECKED)[place - 1]]
             values = dict(zip(names, map(float, c.values), strict=True))
             shown = ", ".join(f"{n} {v:.4g}" for n, v in values.items() if not isnan(v))
             printable, robust = c.print_worst or "not asked", "robust" if c.is_robust else "not robust"
             line = f"proposed-{place}.toml: {robust}; print check: {printable}; {shown}"
-            yield Sentence(line, terminal=True, page=False)
+            yield from echo(line)
             rows.append(
                 {
                     "file": f"proposed-{place}.toml",

@@ -14,7 +14,7 @@ from ..design.settings import PRESET, PRINTER, USUAL_RESIN
 from ..errors import OutputError
 from ..files import json_text
 from ..run.inputs import digest
-from ..run.parts import File, Part, Sentence, Table, recorded
+from ..run.parts import File, Part, Sentence, Table, echo, recorded
 from ..run.study import Members, Over, Study, derived, given, section, stage
 from .inputs import MaterialInput, PrinterInput, UnitInput, asked
 
@@ -144,7 +144,7 @@ class Specimens(Study):
             one = parts[name]
             mass = made.volume_mm3 / 1e3 * material.density_g_per_ml
             yield File(f"{name}.stl", made.written)
-            yield Sentence(f"{name}.stl: {mass:.2f} g, {one.measure}", terminal=True, page=False)
+            yield from echo(f"{name}.stl: {mass:.2f} g, {one.measure}")
             rows.append(
                 {
                     "name": name,
@@ -185,10 +185,8 @@ class Specimens(Study):
                 for row in rows
             ],
         )
-        yield Sentence(
-            f"report.html lists the measurements; {TEMPLATE}/ holds the templates that `diagnose` reads",
-            terminal=True,
-            page=False,
+        yield from echo(
+            f"report.html lists the measurements; {TEMPLATE}/ holds the templates that `diagnose` reads"
         )
 
     @section("gauge", "Gauge: caliper measurements")
@@ -275,7 +273,7 @@ def experiments(parts: Mapping[str, Specimen]) -> str:
     return "\n".join(lines) + "\n"
 
 
-def specimens(unit: design.Unit, scales: tuple[float, ...] = SCALES, cells: int = CELLS) -> list[Specimen]:
+def specimens(unit: design.Unit) -> list[Specimen]:
     """Every specimen of a unit's design, of nominal size; the paper tested three cubes a scale."""
     from ..design import coupons
     from ..design.strut_cell import specimen_solid, strut_cell
@@ -283,18 +281,18 @@ def specimens(unit: design.Unit, scales: tuple[float, ...] = SCALES, cells: int 
     force = ("displacement_mm", "force_N")
     gauge = "measure every size of gauge.csv with calipers; `export --compensate gauge.csv` uses them"
     found = [Specimen("gauge", coupons.gauge, gauge)]
-    for scale in scales:
+    for scale in SCALES:
         scaled = attrs.evolve(unit, scale=scale)
         nominal = attrs.evolve(strut_cell(scaled), offset_xy_mm=0.0, offset_z_mm=0.0)
-        side = round(cells * nominal.size_mm, 4)
+        side = round(CELLS * nominal.size_mm, 4)
         found.append(
             Specimen(
                 f"cube-{scale:g}x",
-                lambda cell=nominal: specimen_solid(cell, cells),  # type: ignore[misc]
+                lambda cell=nominal: specimen_solid(cell, CELLS),  # type: ignore[misc]
                 "weigh it; compress it between plates to 40 % at 10 mm/min along its build axis",
                 "lattice_compression",
                 {
-                    "cells": [cells] * 3,
+                    "cells": [CELLS] * 3,
                     "section_mm": [side] * 2,
                     "length_mm": side,
                     "axis": "z",

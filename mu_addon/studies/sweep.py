@@ -13,12 +13,12 @@ import attrs
 from .. import design
 from ..design.quantity import described
 from ..reading import parse_json
-from ..run.parts import Beside, Chart, Fact, Part, Sentence, Table, csv, recorded
+from ..run.parts import Beside, Chart, Fact, Part, Sentence, Table, csv, echo, recorded
 from ..run.study import Dropped, Found, Input, Over, Study, Written, given, section, stage
 from ..usecases import parameter_study
 from ..usecases.parameter_study.settings import ADD, WORKERS
 from ..usecases.simulate_and_place.settings import STAGES
-from .inputs import UNIT, OnceInput, SchedulerInput
+from .inputs import UNIT, SchedulerInput, once
 
 TABLE, PROTOCOL = "points.csv", "protocol.csv"
 LAST = ("seconds", "memory_MB", "worker", "what", "where", "what_to_do")
@@ -86,14 +86,10 @@ class Sweep(Study):
     files = {TABLE: "a row for each point: inputs, figures, or why it failed"}
 
     plan: parameter_study.Plan = given(PlanInput())
-    workers: int = given(
-        OnceInput(descriptions=(WORKERS,), metavar="N"), default=WORKERS.default, converter=WORKERS.checked
-    )
+    workers: int = once(WORKERS, metavar="N")
     scheduler: str = given(SchedulerInput(), default="")
-    add: int = given(OnceInput(descriptions=(ADD,), metavar="N"), default=ADD.default, converter=ADD.checked)
-    retry: bool = given(
-        OnceInput(descriptions=(described("retry", False, "run the failed points again"),)), default=False
-    )
+    add: int = once(ADD, metavar="N")
+    retry: bool = once(described("retry", False, "run the failed points again"))
 
     def __attrs_post_init__(self) -> None:
         self.density  # noqa: B018  A resin that is not there is reported before any work.
@@ -189,8 +185,7 @@ class Sweep(Study):
         yield recorded("failures", failures)
         words = f"{len(done)} of {len(rows)} points done, {len(failed)} failed"
         words += "" if mean is None else f"; {mean:.1f} s and up to {most} MB each"
-        for line in (words, *(f"failed: {what}" for what in failures[:5])):
-            yield Sentence(line, terminal=True, page=False)
+        yield from echo(words, *(f"failed: {what}" for what in failures[:5]))
         if failed:
             words = f"{len(failed)} of {len(rows)} points failed: they are rows of points.csv, too."
             yield Sentence(words, note=True)

@@ -5,7 +5,6 @@ from scipy.linalg import expm
 from scipy.spatial.transform import Rotation
 
 from mu_addon.chain.rigid_motion import (
-    adjoint,
     exponential,
     inverse,
     logarithm,
@@ -49,8 +48,3 @@ def test_slope_is_the_spatial_twist_of_a_change():
             twist = rate @ inverse(exponential(eta))
             wanted = [twist[2, 1], twist[0, 2], twist[1, 0], *twist[:3, 3]]
             np.testing.assert_allclose(slope(eta) @ change, wanted, atol=1e-7)
-
-
-def test_adjoint_carries_a_twist_through_a_motion():
-    g, eta = exponential(ETA[0]), ETA[1]
-    np.testing.assert_allclose(g @ exponential(eta) @ inverse(g), exponential(adjoint(g) @ eta), atol=1e-10)

@@ -166,7 +166,7 @@ BAD_FILES = {
         "kind = 'body-centered' is not known; did you mean 'body-centred'?",
         "line 4, [lattice] kind",
     ),
-    "no choice": (HEAD + "[lattice]\nkind = 2\n", "kind = 2 is not a name", "line 4"),
+    "no choice": (HEAD + "[lattice]\nkind = 2\n", "kind = 2 is not a text", "line 4"),
     "rule": (HEAD + "[chambers]\n# thick\nwall_mm = 5\n", "too thick", "line 5"),
 }
 

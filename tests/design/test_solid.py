@@ -185,9 +185,9 @@ def test_a_loose_body_is_caught(monkeypatch):
     ],
 )
 def test_each_number_is_a_gate(change, gate):
-    gates.require(built("mu-1.0x").gates)
+    gates.require_solid(built("mu-1.0x").gates)
     with pytest.raises(gates.GateError, match=f"gate: {gate}"):
-        gates.require(attrs.evolve(built("mu-1.0x").gates, **change))
+        gates.require_solid(attrs.evolve(built("mu-1.0x").gates, **change))
 
 
 def test_an_open_surface_is_caught():

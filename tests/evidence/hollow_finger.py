@@ -16,11 +16,14 @@ from tests.fem.bodies import _grid, make
 UNIT = load_preset("mu-1.0x").evolve(membrane_modulus_kPa=400.0)
 
 
-def finger(unit, settings=None, *_, **__):
-    """Half mesh of 15 x 15 mm at scale 1, as long as the unit; at +y half of it is wall."""
+def finger(unit, settings=None, *_, half_width=0.6, **__):
+    """Half mesh as long as the unit, by default of 15 x 15 mm at scale 1; at +y half of it is wall.
+
+    half_width: in cells.
+    """
     d = unit.printed
     refine = 0.35 if settings is None else settings.refine
-    half, wall, cap = 0.6 * d.cell, 2.0 * d.wall, 0.3 * d.cell
+    half, wall, cap = half_width * d.cell, 2.0 * d.wall, 0.3 * d.cell
     thick, across = 0.9 * half, max(2, round(4 * refine))
     xs = [*np.linspace(0.0, half - wall, across + 1), half]
     ys = [-half, *np.linspace(wall - half, half - thick, across + 1), half]

@@ -2,11 +2,11 @@
 
 import csv
 import json
+import tomllib
 
 import numpy as np
 import pytest
 
-from mu_addon.homogenize.effective_file import read_effective
 from mu_addon.studies import homogenize
 
 from .processes import here
@@ -45,8 +45,8 @@ def test_it_leaves_tensor_curve_law_and_report(tmp_path, monkeypatch):
     strain, stress = (np.array(cell[k], float) for k in ("strain", "stress_kPa"))
     rise = np.interp(0.02, strain, stress) - np.interp(-0.02, strain, stress)
     assert rise / 0.04 == pytest.approx(moduli["E100"], rel=0.02)
-    law = read_effective(out / "effective.toml")
-    assert law.C44_kPa == pytest.approx(moduli["C44"])
+    law = tomllib.loads((out / "effective.toml").read_text())
+    assert law["moduli"]["C44_kPa"] == pytest.approx(moduli["C44"])
     report = (out / "report.html").read_text()
     for words in ("Young&#x27;s modulus", "Lattice law for the analysis mesh"):
         assert words in report or words.replace("&#x27;", "'") in report

@@ -71,7 +71,7 @@ def test_scales_share_one_mesh_and_one_tensor(cache: Path) -> None:
     assert np.array_equal(one.tets, other.tets)
     assert other.nodes == pytest.approx(1.5 * one.nodes, rel=1e-12)
     tensors = [
-        effective_tensor(m, cell_materials(paper_cell(s), m, 2.5, 0.45), (6.25 * s,) * 3)
+        effective_tensor(m, cell_materials(paper_cell(s), m, 2.5, 0.45))
         for s, m in ((1.0, one), (1.5, other))
     ]
     assert np.allclose(tensors[1].C, tensors[0].C, rtol=1e-9, atol=0)
@@ -81,7 +81,7 @@ def test_scales_share_one_mesh_and_one_tensor(cache: Path) -> None:
 def test_a_printed_offset_makes_another_mesh(cache: Path) -> None:
     thick = paper_cell(offset_xy_mm=0.15, offset_z_mm=0.15)
     mesh = mesh_cell(thick, COARSE, cache)
-    found = effective_tensor(mesh, cell_materials(thick, mesh, 2.5, 0.45), (6.25,) * 3)
+    found = effective_tensor(mesh, cell_materials(thick, mesh, 2.5, 0.45))
     assert found.relative_density == pytest.approx(relative_density(thick, COARSE.facets), rel=0.01)
     assert found.relative_density > 1.2 * relative_density(paper_cell())
 
@@ -99,7 +99,7 @@ def test_a_skin_is_as_deep_as_it_says(cache: Path) -> None:
     assert share.min() == 0
     assert share.max() == 1
 
-    stiff = effective_tensor(mesh, cell_materials(cell, mesh, 1.0, 0.3), (5.0,) * 3)
+    stiff = effective_tensor(mesh, cell_materials(cell, mesh, 1.0, 0.3))
     plain = effective_tensor(
         mesh, cell_materials(StrutCell(cells.SIMPLE_CUBIC, 10.0, 1.0, 1.0), mesh, 1.0, 0.3)
     )

@@ -80,7 +80,7 @@ def test_the_path_of_a_target_may_be_a_freedom():
         with pytest.raises(InputError, match=words) as error:
             design(HEAD + ANGLE + WALL + path.replace('"alpha4"', wrong))
         assert "line 13, [freedom] values" in error.value.where
-    with pytest.raises(InputError, match="is not a path of the unit"):
+    with pytest.raises(InputError, match="path is missing"):
         design(HEAD + ANGLE + slope + WALL)
 
 
@@ -265,7 +265,7 @@ def test_what_follows_a_freedom_changes_with_it():
         (HEAD + ANGLE.replace("angle", "tip_force").replace("30", "-5") + WALL, "toward which", "line 5"),
         (HEAD + FORCE.replace("gap_mm = 2", "gap_mm = 999") + WALL, "gap_mm = 999 is out", "line 6"),
         (HEAD + FORCE.replace("gap_mm = 2", 'direction = "y"') + WALL, "unknown key 'direction'", "line 6"),
-        (HEAD + ASIDE + WALL, "does not move", "line 7"),
+        (HEAD + ASIDE + WALL, "direction = 'x' is not known", "line 7"),
         (HEAD + ANGLE + CELL, "does not give column, row and chamber", "line 9"),
         (HEAD + ANGLE + CELL.replace('"0 2"', '"0 2 *"').replace("1.3", "3"), "not a range of", "line 10"),
         (HEAD + ANGLE + CELL.replace('"0 2"', '"0 9 *"'), "0 9 *", "line 9"),

@@ -30,7 +30,6 @@ from mu_addon.fem.protocol import Protocol
 from mu_addon.files import read_npz, write_npz
 from mu_addon.graph.tree_file import read_tree
 from mu_addon.grasp import read_phases, shipped_phases
-from mu_addon.homogenize.effective_file import read_effective
 from mu_addon.lab_files.tracked_table import read_pixels
 from mu_addon.measured.folder import read_folder
 from mu_addon.run.folder import keep_inputs
@@ -42,7 +41,6 @@ from mu_addon.studies.inputs import ResinInput
 from mu_addon.studies.unit_ranking import UnitStudy
 from mu_addon.usecases.resume import use_case_of
 
-from ..homogenize.lattice_laws import body_centred
 from .test_reading import READERS
 
 COUNT = int(os.environ.get("MUTANTS", "15"))
@@ -186,7 +184,6 @@ CORPUS: dict[str, tuple[str, Callable[[Path], bytes], Callable[[Path], Any]]] = 
     if text is not None
 }
 CORPUS |= {
-    "lattice law": ("effective.toml", lambda _: body_centred().text().encode(), read_effective),
     "phases": ("phases.csv", lambda _: shipped_phases().text().encode(), read_phases),
     "pixels": ("pixels.csv", lambda _: PIXELS, read_pixels),
     "STL": ("body.stl", lambda _: stl_bytes(VERTICES, np.array(FACES)), read_body),

@@ -29,7 +29,6 @@ from mu_addon.evidence.extended import load_model
 from mu_addon.fem.protocol import read_protocol
 from mu_addon.files import read_npz
 from mu_addon.grasp import read_phases
-from mu_addon.homogenize.effective_file import read_effective
 from mu_addon.lab_files.tracked_table import read_pixels
 from mu_addon.materials.library import read_material
 from mu_addon.measured import table
@@ -68,7 +67,6 @@ READERS: dict[str, tuple[Callable[[Path], Any], str | None]] = {
     "printer": (read_printer, printer_text(load_printer())),
     "material": (read_material, (ASSETS / "materials" / "elastic-50a-v1.toml").read_text()),
     "model": (load_model, MODEL),
-    "lattice law": (read_effective, None),
     "calibration": (read_calibration, CALIBRATION),
     "sweep": (read_plan, PLAN),
     "bench": (read_bench, None),

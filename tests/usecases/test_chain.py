@@ -14,6 +14,8 @@ from mu_addon.errors import InputError
 from mu_addon.studies.chain import Chain
 from mu_addon.usecases.resume import use_case_of
 
+from ..evidence.hollow_finger import finger
+
 ROOT = Path(__file__).resolve().parents[2]
 CHAIN = """
 format = 1
@@ -111,9 +113,11 @@ def rows_of(path):
 
 @pytest.mark.slow
 def test_a_chain_from_the_command_line_leaves_its_files_and_resumes(folder, monkeypatch):
-    (folder / "short.toml").write_text("format = 1\n[chambers]\ncount = 3\n")
-    text = CHAIN.replace('preset = "mu-1.0x"', 'file = "short.toml"').replace("refine = 0.25", "refine = 0.2")
-    (folder / "chain.toml").write_text(text)
+    """Of hollow fingers: printed units between plates are those of `test_joint_learning`."""
+    monkeypatch.setattr("mu_addon.body.mesh_printed", finger)
+    unit = "format = 1\n[chambers]\ncount = 3\n[material]\nmembrane_modulus_kPa = 400\n"
+    (folder / "short.toml").write_text(unit)
+    (folder / "chain.toml").write_text(CHAIN.replace('preset = "mu-1.0x"', 'file = "short.toml"'))
     out = folder / "out"
     assert main(["chain", str(folder / "chain.toml"), "--out", str(out)]) == 0
     rows = rows_of(out / "tip.csv")

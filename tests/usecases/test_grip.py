@@ -7,8 +7,8 @@ import attrs
 import numpy as np
 import pytest
 
-from mu_addon.body.printed_mesh import mesh_printed
 from mu_addon.cli.main import main
+from mu_addon.design.anchors import anchor_points
 from mu_addon.design.assets import asset_root
 from mu_addon.design.gripper import load_gripper
 from mu_addon.design.parameters import to_toml
@@ -18,20 +18,32 @@ from mu_addon.fem.protocol import Protocol
 from mu_addon.fem.unit_materials import materials_of
 from mu_addon.files import read_npz
 from mu_addon.grasp import NAMES, Contact, Cube, Phases, grasp, read_phases, shipped_phases
-from mu_addon.meshing.settings import MeshSettings
 from mu_addon.report.grasp_files import even, write_halves
 from mu_addon.report.motion_files import read_motion
 from mu_addon.report.pc2 import read_pc2
 from mu_addon.studies.grip import Grip
 
-COARSE = MeshSettings(refine=0.35)
+from ..evidence import hollow_finger
+
+# A hollow body as wide as its envelope stands for the fingers: what a grasp makes of them does not depend on
+# their struts. Printed ones are grasped with at night.
+HOLLOW = {"cells_y_plus": 1, "allow_symmetric": True, "row": 1, "seats": False, "membrane_modulus_kPa": 1e3}
+
+
+def wide(unit, *settings, **_):
+    """Its mesh, with a node at each anchor."""
+    mesh = hollow_finger.finger(unit, *settings, half_width=1.5)
+    nodes = mesh.nodes.copy()
+    for anchor in anchor_points(unit):
+        nodes[np.linalg.norm(nodes - anchor, axis=1).argmin()] = anchor
+    return attrs.evolve(mesh, nodes=nodes)
 
 
 @pytest.fixture(scope="module")
 def finger():
     gripper = load_gripper("gripper")
-    gripper = attrs.evolve(gripper, unit=gripper.unit.evolve(count=3), path="alpha1")
-    mesh = mesh_printed(gripper.unit, COARSE)
+    gripper = attrs.evolve(gripper, unit=gripper.unit.evolve(count=3, **HOLLOW), path="alpha1")
+    mesh = wide(gripper.unit)
     return gripper, mesh, materials_of(gripper.unit, mesh)
 
 
@@ -97,31 +109,30 @@ def smooth(finger):
     short = Phases(Protocol(*corners), ("i", *NAMES))
     return {
         side: grasp(gripper, Cube(side), short, mesh, materials, Contact(friction=0.0), step_s=1.0)
-        for side in (25.0, 29.0)
+        for side in (29.4, 29.8)
     }
 
 
 def test_without_friction_a_cycle_gives_all_work_back_and_lifts_nothing(smooth):
     """Pressure and contact are then a potential: what closing took, opening returns."""
-    found = smooth[29.0]
+    found = smooth[29.8]
     hold = found.end("iii")
-    # Of a finger of three chambers, which reaches 1 mm into the cube's place.
-    assert found.normal_N[hold] > 0.02
+    assert found.normal_N[hold] > 1.0
     rise = np.diff(found.volume_mm3)
     works = (found.pressure_kPa[1:] + found.pressure_kPa[:-1]) / 2e3 * rise
     assert abs(found.pressure_work_mJ) < 1e-4 * np.abs(works).sum()
     assert np.abs(found.u[-1]).max() < 1e-5
     assert found.lost_mJ[-1] == 0.0
-    # Edges aside, a face without friction pushes square to itself.
-    assert abs(found.down_N[hold]) < 1e-3 * found.normal_N[hold]
+    # A turned edge apart, a face without friction pushes square to itself.
+    assert abs(found.down_N[hold]) < 0.05 * found.normal_N[hold]
     assert not found.lift.held
     assert 0 < found.deepest_mm.max() < 0.4
 
 
 def test_the_smaller_cube_bends_a_finger_more_and_is_pressed_less(smooth):
-    small, large = smooth[25.0], smooth[29.0]
+    small, large = smooth[29.4], smooth[29.8]
     hold = small.end("iii")
-    assert small.angle_deg[hold] > large.angle_deg[hold] + 0.5
+    assert small.angle_deg[hold] > large.angle_deg[hold] + 0.1
     assert 0 < small.normal_N[hold] < large.normal_N[hold]
     # Before either is touched they are one.
     assert small.angle_deg[small.end("i")] == pytest.approx(large.angle_deg[large.end("i")], abs=1e-6)
@@ -140,9 +151,10 @@ def test_the_printable_part_from_the_command_line(tmp_path, capsys):
     assert "Gripper" in (out / "report.html").read_text()
 
 
-def squeezed(folder, *more):
+def squeezed(folder, side, *more, **values):
     """Line and folder of a grasp by fingers of three chambers, which hold a lighter, smoother cube."""
-    line = ["grip", "--gripper", str(short_gripper(folder)), "--out", str(folder / "out"), "--cube", "25"]
+    gripper = short_gripper(folder, **values)
+    line = ["grip", "--gripper", str(gripper), "--out", str(folder / "out"), "--cube", side]
     line += ["--density", "0.6", "--friction", "0.3", "--coarse", "--no-self-contact"]
     line += ["--refine", "0.3", *more]
     assert main(line) == 0
@@ -152,7 +164,7 @@ def squeezed(folder, *more):
 @pytest.mark.nightly("test_a_grasp_from_the_command_line_leaves_its_files_and_a_second_finds_it_done")
 def test_a_grasp_with_friction_from_the_command_line(tmp_path):
     """Grasp, hold, lift, release: forces, energy and light, by a cube that slides."""
-    _, out = squeezed(tmp_path)
+    _, out = squeezed(tmp_path, "25")
     summary = json.loads((out / "summary.json").read_text())
     g = summary["grasps"]["25"]
     assert g["held"]
@@ -173,30 +185,31 @@ SQUEEZE = "time_s,pressure_kPa,phase\n0,0,i\n0.5,0,i\n2.5,20,ii\n3,20,iii\n3.5,2
 
 
 @pytest.mark.slow
-def test_a_grasp_from_the_command_line_leaves_its_files_and_a_second_finds_it_done(tmp_path):
+def test_a_grasp_from_the_command_line_leaves_its_files_and_a_second_finds_it_done(tmp_path, monkeypatch):
+    monkeypatch.setattr("mu_addon.body.mesh_printed", wide)
     (tmp_path / "p.csv").write_text(SQUEEZE)
-    line, out = squeezed(tmp_path, "--protocol", str(tmp_path / "p.csv"))
+    line, out = squeezed(tmp_path, "25.8", "--protocol", str(tmp_path / "p.csv"), **HOLLOW)
     summary = json.loads((out / "summary.json").read_text())
-    g = summary["grasps"]["25"]
+    g = summary["grasps"]["25.8"]
     assert g["normal_at_hold_N"] > 0.01
     # Within Coulomb's bound, and more work is put in than comes back.
     assert abs(g["down_at_hold_N"]) <= 0.3 * g["normal_at_hold_N"] * (1 + 1e-3)
     assert g["lost_to_friction_mJ"] > 0
-    assert set(summary["light"]) == {"25"}
-    motion = read_motion(out / "cube-25")
+    assert set(summary["light"]) == {"25.8"}
+    motion = read_motion(out / "cube-25.8")
     assert len(motion.time_s) == len(motion.state_kPa)
-    whole = read_npz(out / "cube-25" / "gripper.npz")
+    whole = read_npz(out / "cube-25.8" / "gripper.npz")
     for side, rest in zip(("left", "right"), whole["rest_mm"], strict=True):
-        positions, start, step = read_pc2(out / "cube-25" / f"{side}.pc2")
+        positions, start, step = read_pc2(out / "cube-25.8" / f"{side}.pc2")
         np.testing.assert_allclose(positions[0], rest, atol=1e-3)
         assert (start, step) == (0.0, 0.5)
         assert whole["triangles"].max() < positions.shape[1]
     # Cut open, both show the half away from +x, and end where the whole ones do.
     for side, rest, half in zip(
-        ("left", "right"), whole["rest_mm"], write_halves(out / "cube-25"), strict=True
+        ("left", "right"), whole["rest_mm"], write_halves(out / "cube-25.8"), strict=True
     ):
         vertices, triangles, membrane = half
-        positions, _, _ = read_pc2(out / "cube-25" / f"{side}-cut.pc2")
+        positions, _, _ = read_pc2(out / "cube-25.8" / f"{side}-cut.pc2")
         np.testing.assert_allclose(positions[0], vertices, atol=1e-3)
         assert vertices[:, 0].max() <= 1e-9
         np.testing.assert_allclose(vertices[:, 1:].min(axis=0), rest[:, 1:].min(axis=0), atol=1e-3)
@@ -206,21 +219,18 @@ def test_a_grasp_from_the_command_line_leaves_its_files_and_a_second_finds_it_do
         flat = (corners[:, :, 0] == 0.0).all(axis=1)
         assert (normals[flat, 0] > 0.0).all(), "the section faces +x"
     names = {p.name for p in out.iterdir()}
-    assert {"gripper.stl", "grasp_25.csv", "pull_25.csv", "report.html", "frame_25_iv.png"} <= names
+    assert {"gripper.stl", "grasp_25.8.csv", "pull_25.8.csv", "report.html", "frame_25.8_iv.png"} <= names
     report = (out / "report.html").read_text()
-    before = (out / "grasp_25.csv").read_text()
+    before = (out / "grasp_25.8.csv").read_text()
     assert "capacity / weight" in report
+    monkeypatch.setattr("mu_addon.grasp.grasp", lambda *_, **__: pytest.fail("grasped again"))
     assert main([*line, "--no-report"]) == 0
-    again = json.loads((out / "summary.json").read_text())
-    assert again["seconds"]["grasp of 25 mm"] < 0.3 * summary["seconds"]["grasp of 25 mm"]
-    assert (out / "grasp_25.csv").read_text() == before
+    assert (out / "grasp_25.8.csv").read_text() == before
 
 
-def short_gripper(folder):
+def short_gripper(folder, **values):
     """A gripper of fingers of three chambers, which reach no farther than a narrow gap, as a file."""
-    whole = load_gripper("gripper").unit
-    short = attrs.evolve(whole, chambers=attrs.evolve(whole.chambers, count=3))
-    (folder / "unit.toml").write_text(to_toml(short))
+    (folder / "unit.toml").write_text(to_toml(load_gripper("gripper").unit.evolve(count=3, **values)))
     text = (asset_root() / "presets" / "gripper.toml").read_text().replace("gap_mm = 30.0", "gap_mm = 26.0")
     for key, value in (("unit", "unit.toml"), ("path", "alpha1")):
         text = re.sub(f"(?m)^{key} = .*", f'{key} = "{value}"', text)

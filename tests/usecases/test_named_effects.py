@@ -232,7 +232,9 @@ def test_another_size_or_direction_is_another_result_and_no_weight_has_no_direct
         for density in (1000.0, 1300.0)
     }
     assert len(keys) == 4
-    assert with_effects(90.0, strain_stiffening=0.4).texts() == with_effects(0.0, strain_stiffening=0.4).texts()
+    assert (
+        with_effects(90.0, strain_stiffening=0.4).texts() == with_effects(0.0, strain_stiffening=0.4).texts()
+    )
     assert with_effects(90.0, gravity=0.0).texts() == JOB.texts()
     assert with_effects(90.0, gravity=0.0).effects.parts == JOB.effects.parts == ()
 

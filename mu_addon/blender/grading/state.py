@@ -7,7 +7,8 @@ from typing import Any
 import bpy
 import numpy as np
 
-from ...design.grading import LEAST, MOST, Field
+from ...design.factor_list import LEAST, MOST
+from ...design.grading import Field
 from ...errors import InputError
 from ..preview.materials import material
 from ..preview.skeletons import box

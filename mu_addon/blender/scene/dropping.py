@@ -13,7 +13,7 @@ from bpy.props import FloatVectorProperty, StringProperty
 from ...design.body import read_body
 from ...design.parameters import read_unit
 from ...errors import InputError
-from ...reading import file_text, parse_toml
+from ...reading import parse_toml, text_in
 from ..preview import skeletons
 from ..shared import landing, viewports
 from ..shared.operators import reports_errors
@@ -63,10 +63,7 @@ class MU_OT_drop_toml(_Dropped, bpy.types.Operator):
     @reports_errors
     def execute(self, context):
         path = self.path()
-        try:
-            document = parse_toml(file_text(path, _LONGEST), str(path))
-        except (OSError, UnicodeDecodeError) as error:
-            raise InputError(f"cannot read the file: {error}", str(path), "drop a TOML file") from error
+        document = parse_toml(text_in(path, "file", "drop a TOML file", _LONGEST), str(path))
         if "nodes" in document:
             bpy.ops.mu.tree_load(filepath=str(path))
             return {"FINISHED"}

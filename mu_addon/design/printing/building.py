@@ -7,8 +7,8 @@ from numpy.typing import NDArray
 
 from . import layers
 from .chambers import Chambers
-from .finding import MOST_PLACES, Finding, Points, Severity, clustered, counted
-from .printer import Printer
+from .finding import Finding, Points, Severity, clustered, counted, judged
+from .printer import Limit, Printer
 from .voxels import VoxelRows
 
 
@@ -46,45 +46,23 @@ def build_findings(
 
 def _islands(name: str, places: Points, printer: Printer, severity: Severity, remedy: str) -> Finding:
     layer = printer.limits["layer_mm"]
-    return Finding(
-        name,
-        severity if len(places) else "pass",
-        counted(
-            len(places), "region starts without support (island)", "regions start without support (islands)"
-        ),
-        float(len(places)),
-        0.0,
-        "",
-        places[:MOST_PLACES],
-        len(places),
-        f"layers of {layer.value:g} mm: {layer.source}",
-        layer.assumed,
-        remedy if len(places) else "",
+    none = Limit(0.0, f"layers of {layer.value:g} mm: {layer.source}", layer.assumed)
+    what = counted(
+        len(places), "region starts without support (island)", "regions start without support (islands)"
     )
+    return judged(name, len(places) > 0, severity, what, float(len(places)), none, places, remedy, "")
 
 
 def _cups(closed: layers.Cups, printer: Printer) -> Finding:
     limit = printer.limits["cup_ml"]
     most = float(closed.volume[:1].sum()) / 1e3
     large = closed.volume / 1e3 > limit.value
-    return Finding(
-        "cups",
-        "warning" if large.any() else "pass",
-        f"{most:.3f} ml at most sealed against the film",
-        most,
-        limit.value,
-        "ml",
-        closed.places[large][:MOST_PLACES],
-        int(large.sum()),
-        limit.source,
-        limit.assumed,
-        (
-            "print with the opening toward the platform: see the build directions; or vent it: "
-            "export --vent-along"
-        )
-        if large.any()
-        else "",
+    remedy = (
+        "print with the opening toward the platform: see the build directions; or vent it: "
+        "export --vent-along"
     )
+    what = f"{most:.3f} ml at most sealed against the film"
+    return judged("cups", bool(large.any()), "warning", what, most, limit, closed.places[large], remedy, "ml")
 
 
 def _spans(
@@ -93,18 +71,9 @@ def _spans(
     limit = printer.limits[key]
     bad = mine & (size > limit.value)
     most = float(size[mine].max(initial=0.0))
-    worst = clustered(places[bad], size[bad])
     where = "between supports" if name == "bridge" else "beyond support"
-    return Finding(
-        name,
-        "warning" if bad.any() else "pass",
-        f"{most:.3g} mm {where} at most, flatter than {printer['overhang_deg']:g} degrees",
-        most,
-        limit.value,
-        "mm",
-        worst[:MOST_PLACES],
-        len(worst),
-        limit.source,
-        limit.assumed,
-        "support it, or rotate the part" if bad.any() else "",
+    what = f"{most:.3g} mm {where} at most, flatter than {printer['overhang_deg']:g} degrees"
+    worst = clustered(places[bad], size[bad])
+    return judged(
+        name, bool(bad.any()), "warning", what, most, limit, worst, "support it, or rotate the part"
     )

@@ -22,9 +22,9 @@ from .building import build_findings
 from .chambers import chambers, distance_field
 from .crossing import MOST_CROSSINGS, crossings
 from .drainage import drainage_findings
-from .finding import NOWHERE, Finding, Severity, at_least, clustered, none_of
+from .finding import NOWHERE, Finding, Severity, at_least, clustered, judged, none_of
 from .orientation import Build, fits, orientations
-from .printer import Printer
+from .printer import Limit, Printer
 from .thickness import cast_rays, samples
 from .voxels import frame_along, voxel_rows
 from .walls import chamber_walls, narrowest, thinnest
@@ -43,30 +43,19 @@ def against_nominal(
     `warning`.
     """
     found, wanted = genus(vertices, triangles), genus(*nominal)
-    tunnels = Finding(
-        "tunnels",
-        "pass" if found == wanted else "error",
-        f"the part has {found} tunnels (genus), the unit's own solid {wanted}" + _difference(found - wanted),
-        float(found),
-        float(wanted),
-        source="the unit's own solid",
-        count=int(found != wanted),
-        remedy="" if found == wanted else "export the unit again, or give the --path of the part's waveguide",
+    limit = Limit(float(wanted), "the unit's own solid", False)
+    what = f"the part has {found} tunnels (genus), the unit's own solid {wanted}" + _difference(
+        found - wanted
     )
-    mm3, expected = volume(vertices, triangles), volume(*nominal)
-    share = mm3 / expected - 1.0
-    same = abs(share) <= VOLUME_TOLERANCE
-    size = Finding(
-        "volume",
-        "pass" if same else "warning",
-        f"{mm3 / 1e3:.4g} ml, {share:+.1%} against {expected / 1e3:.4g} ml of the unit's own solid",
-        mm3 / 1e3,
-        expected / 1e3,
-        "ml",
-        source=f"the unit's own solid, within {VOLUME_TOLERANCE:.0%}",
-        count=int(not same),
-        remedy="" if same else "check whether the print offset was subtracted, or export the unit again",
-    )
+    remedy = "export the unit again, or give the --path of the part's waveguide"
+    tunnels = judged("tunnels", found != wanted, "error", what, float(found), limit, remedy=remedy, unit="")
+    ml, expected = volume(vertices, triangles) / 1e3, volume(*nominal) / 1e3
+    share = ml / expected - 1.0
+    limit = Limit(expected, f"the unit's own solid, within {VOLUME_TOLERANCE:.0%}", False)
+    what = f"{ml:.4g} ml, {share:+.1%} against {expected:.4g} ml of the unit's own solid"
+    remedy = "check whether the print offset was subtracted, or export the unit again"
+    off = abs(share) > VOLUME_TOLERANCE
+    size = judged("volume", off, "warning", what, ml, limit, remedy=remedy, unit="ml")
     return [tunnels, size]
 
 
@@ -124,7 +113,6 @@ def check(
     stages: Collection[str] = STAGES,
     stage: Stage = nullcontext,
     nominal: tuple[Vertices, Triangles] | None = None,
-    verdict: Callable[[PrintCheck], None] | None = None,
     share: Callable[[float], None] | None = None,
     in_body: bool = False,
 ) -> PrintCheck:
@@ -134,10 +122,9 @@ def check(
     from the platform. A surface that is not closed, inside out or of the wrong size is examined no further.
     `stages` may leave some out: layers need chambers, directions need chambers and thickness. stage: context
     that is entered, with its name, for each stage. nominal: surface of the unit's solid, for comparison with
-    a surface from elsewhere. verdict: called with the result before build directions are compared, which adds
-    no finding; share: called with the share of them done. in_body: a user-defined body replaces the lattice's
-    box, so that only the height of the drawing is known. Raises InputError for a window that does not fit the
-    unit.
+    a surface from elsewhere. share: called with the share of build directions that are done. in_body: a
+    user-defined body replaces the lattice's box, so that only the height of the drawing is known. Raises
+    InputError for a window that does not fit the unit.
     """
     vertices, triangles = stl_surface(stl_bytes(vertices, triangles))
     up = np.asarray(direction, float) / np.linalg.norm(direction)
@@ -151,20 +138,14 @@ def check(
     if unit is not None:
         found += _drawing(unit, window, printer)
 
-    def unexamined(sound: bool) -> PrintCheck:
-        short = PrintCheck([*found, _unexamined(sound)], figures, [])
-        if verdict is not None:
-            verdict(short)
-        return short
-
     if not sound or any(f.severity == "error" for f in sized):
-        return unexamined(sound)
+        return PrintCheck([*found, _unexamined(sound)], figures, [])
 
     from manifold3d import Error, Manifold, Mesh64
 
     solid = Manifold(Mesh64(vertices, triangles.astype(np.uint64)))
     if solid.status() != Error.NoError:
-        return unexamined(False)
+        return PrintCheck([*found, _unexamined(False)], figures, [])
     if nominal is not None:
         found += against_nominal(vertices, triangles, nominal)
     figures["volume_ml"] = solid.volume() / 1e3
@@ -195,8 +176,6 @@ def check(
             more, ml = build_findings(built, pockets, printer)
             found += more
             figures |= ml
-    if verdict is not None:
-        verdict(PrintCheck(found, figures, []))
     builds: list[Build] = []
     if "directions" in stages:
         with stage("build directions"):
@@ -280,22 +259,11 @@ def _size(vertices: Vertices, printer: Printer, unit: Unit | None, up: Array, in
             0.1: " (mm for cm)",
         }
         why = "".join(words for factor, words in known.items() if abs(ratio / factor - 1.0) < 0.02)
-        found.append(
-            Finding(
-                "scale",
-                "pass" if same else "error",
-                f"the part is {ratio:.4g} times its nominal size{why}",
-                ratio,
-                1.0,
-                "",
-                NOWHERE if same else np.stack([low, high])[np.argsort(-off)][:1],
-                0 if same else 1,
-                f"nominal {'height' if in_body else 'size'} of the unit, "
-                + " x ".join(f"{b - a:g}" for a, b in drawn[axes])
-                + " mm",
-                remedy="" if same else "export in mm",
-            )
-        )
+        sizes = " x ".join(f"{b - a:g}" for a, b in drawn[axes])
+        limit = Limit(1.0, f"nominal {'height' if in_body else 'size'} of the unit, {sizes} mm", False)
+        what = f"the part is {ratio:.4g} times its nominal size{why}"
+        worst = np.stack([low, high])[np.argsort(-off)][:1]
+        found.append(judged("scale", not same, "error", what, ratio, limit, worst, "export in mm", ""))
     return [*found, _room(vertices, printer, up)]
 
 

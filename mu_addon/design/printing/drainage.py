@@ -13,8 +13,8 @@ from ..parameters import Unit
 from ..surface import Triangles, Vertices
 from .chambers import Chambers, Opening
 from .faces import edges
-from .finding import NOWHERE, Finding, Points, counted
-from .printer import Printer
+from .finding import Finding, Points, Severity, counted, judged
+from .printer import Limit, Printer
 from .voxels import frame_along
 
 
@@ -44,57 +44,26 @@ def drainage_findings(solid: Any, chambers: Chambers, unit: Unit | None, printer
         widths += [2.0 * radius for k, (_, radius) in enumerate(ways) if k != inlet]
     places = np.array(leaks).reshape(-1, 3)
     wide = f", {max(widths):.2g} mm wide at the most" if widths else ""
-    found = [
-        Finding(
-            "leaks",
-            ("error" if unit is not None else "warning") if leaks else "pass",
-            counted(len(leaks), "way", "ways")
-            + f" out of chambers beside their inlet{wide}; leaks: holes below {1.75 * step:.2g} "
-            "mm are too small for this test",
-            float(len(leaks)),
-            0.0,
-            "",
-            places,
-            len(leaks),
-            "a chamber that must hold pressure may have only one opening",
-            remedy="close the hole" if leaks else "",
-        )
-    ]
+    what = counted(len(leaks), "way", "ways") + (
+        f" out of chambers beside their inlet{wide}; leaks: holes below {1.75 * step:.2g} "
+        "mm are too small for this test"
+    )
+    none = Limit(0.0, "a chamber that must hold pressure may have only one opening", False)
+    severity: Severity = "error" if unit is not None else "warning"
+    count = float(len(leaks))
+    found = [judged("leaks", bool(leaks), severity, what, count, none, places, "close the hole", "")]
     if unit is not None:
         found.append(_leak_test(solid, chambers, unit, places))
     if closed:
-        found.append(
-            Finding(
-                "drain",
-                "error",
-                counted(len(closed), "chamber does not drain", "chambers do not drain"),
-                0.0,
-                limit.value,
-                "mm",
-                np.array(closed),
-                len(closed),
-                limit.source,
-                limit.assumed,
-                "open the inlet",
-            )
-        )
+        what = counted(len(closed), "chamber does not drain", "chambers do not drain")
+        found.append(judged("drain", True, "error", what, 0.0, limit, np.array(closed), "open the inlet"))
     elif inlets:
         least, place = min(inlets, key=lambda way: way[0])
+        what = f"{least:.3g} mm wide at the narrowest point of the drain"
+        remedy = "widen the inlet, or rinse the chamber through a needle"
         bad = least < limit.value
         found.append(
-            Finding(
-                "drain",
-                "warning" if bad else "pass",
-                f"{least:.3g} mm wide at the narrowest point of the drain",
-                least,
-                limit.value,
-                "mm",
-                place[None],
-                int(bad),
-                limit.source,
-                limit.assumed,
-                "widen the inlet, or rinse the chamber through a needle" if bad else "",
-            )
+            judged("drain", bad, "warning", what, least, limit, place[None], remedy, shown=place[None])
         )
     return found
 
@@ -115,18 +84,9 @@ def _leak_test(solid: Any, chambers: Chambers, unit: Unit, leaks: Points) -> Fin
         words += f", of {-sum(volumes) / 1e3:.4g} ml"
     elif not len(leaks) and not before:
         leaks = _holes(stopped, chambers, d)
-    return Finding(
-        "leak test",
-        "pass" if tight else "error",
-        words,
-        float(sealed),
-        1.0,
-        "",
-        leaks if not tight else NOWHERE,
-        0 if tight else max(1, len(leaks)),
-        "exact Boolean with a plug in the inlet",
-        remedy="" if tight else "close the hole, or open the inlet",
-    )
+    limit = Limit(1.0, "exact Boolean with a plug in the inlet", False)
+    remedy = "close the hole, or open the inlet"
+    return judged("leak test", not tight, "error", words, float(sealed), limit, leaks, remedy, "")
 
 
 def _holes(stopped: Any, chambers: Chambers, d: Dimensions) -> Points:

@@ -8,7 +8,7 @@ import attrs
 import numpy as np
 from numpy.typing import NDArray
 
-from .printer import Printer
+from .printer import Limit, Printer
 
 Severity = Literal["error", "warning", "pass", "info"]
 Points = NDArray[np.float64]
@@ -74,23 +74,44 @@ def clustered(points: Points, badness: NDArray[np.float64] | None = None, reach:
     return points[first[np.argsort(-badness[first], kind="stable")]]
 
 
+def judged(
+    check: str,
+    bad: bool,
+    severity: Severity,
+    what: str,
+    value: float,
+    limit: Limit,
+    places: Points = NOWHERE,
+    remedy: str = "",
+    unit: str = "mm",
+    shown: Points = NOWHERE,
+) -> Finding:
+    """Finding of `severity` at its places (k, 3) in mm if bad, with the remedy; else `pass`.
+
+    shown (n, 3): the places of one that passes.
+    """
+    return Finding(
+        check,
+        severity if bad else "pass",
+        what,
+        value,
+        limit.value,
+        unit,
+        (places if bad else shown)[:MOST_PLACES],
+        max(1, len(places)) if bad else 0,
+        limit.source,
+        limit.assumed,
+        remedy if bad else "",
+    )
+
+
 def none_of(name: str, number: int, places: Points, what: tuple[str, str], remedy: str) -> Finding:
     """Finding on faults that must not occur: `error` for any number of them, else `pass`.
 
     places (k, 3) in mm; what: the text for one fault and for several, which follows their number.
     """
-    return Finding(
-        name,
-        "error" if number else "pass",
-        counted(number, *what),
-        float(number),
-        0.0,
-        "",
-        places[:MOST_PLACES],
-        len(places) if number else 0,
-        "a printable surface has none",
-        remedy=remedy if number else "",
-    )
+    none = Limit(0.0, "a printable surface has none", False)
+    return judged(name, number > 0, "error", counted(number, *what), float(number), none, places, remedy, "")
 
 
 def at_least(
@@ -108,20 +129,7 @@ def at_least(
     what: the text; places (k, 3) in mm; remedy: what to do, shown only if the value is below the limit.
     """
     limit = printer.limits[key]
-    bad = value < limit.value
-    return Finding(
-        name,
-        severity if bad else "pass",
-        what,
-        value,
-        limit.value,
-        "mm",
-        places[:MOST_PLACES] if bad else NOWHERE,
-        max(1, len(places)) if bad else 0,
-        limit.source,
-        limit.assumed,
-        remedy if bad else "",
-    )
+    return judged(name, value < limit.value, severity, what, value, limit, places, remedy)
 
 
 def counted(number: int, one: str, several: str) -> str:

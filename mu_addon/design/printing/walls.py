@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from .finding import MOST_PLACES, NOWHERE, Finding, Severity, clustered
+from .finding import Finding, Severity, clustered, judged
 from .printer import Printer
 from .thickness import RayHits, Samples
 
@@ -53,30 +53,16 @@ def _measured(
     bad = width < limit.value - facets_mm
     if not np.isfinite(least):
         words = "no wall is near the limit" if adjective == "thick" else "no gap is near the limit"
-        return Finding(
-            name, "pass", words, np.nan, limit.value, "mm", NOWHERE, 0, limit.source, limit.assumed
-        )
+        return judged(name, False, severity, words, np.nan, limit)
     middle = 0.5 * (surface.points + rays.at)
-    places = clustered(middle[bad], -width[bad]) if bad.any() else middle[[int(width.argmin())]]
-    return Finding(
-        name,
-        severity if bad.any() else "pass",
-        f"{least:.3g} mm {adjective} at least"
-        + (f", in {len(places)} places below the limit" if bad.any() else "")
-        + (
-            ", due to flat facets; not below the limit as drawn"
-            if least < limit.value and not bad.any()
-            else ""
-        ),
-        least,
-        limit.value,
-        "mm",
-        places[:MOST_PLACES],
-        len(places) if bad.any() else 0,
-        limit.source,
-        limit.assumed,
-        remedy if bad.any() else "",
-    )
+    places = clustered(middle[bad], -width[bad])
+    what = f"{least:.3g} mm {adjective} at least"
+    if bad.any():
+        what += f", in {len(places)} places below the limit"
+    elif least < limit.value:
+        what += ", due to flat facets; not below the limit as drawn"
+    shown = middle[[int(width.argmin())]]
+    return judged(name, bool(bad.any()), severity, what, least, limit, places, remedy, shown=shown)
 
 
 def chamber_walls(

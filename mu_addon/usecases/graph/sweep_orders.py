@@ -12,7 +12,7 @@ import attrs
 from ...errors import InputError
 from ...graph.definition import Call, Outputs
 from ...graph.evaluation import Finished, Order
-from ...reading import file_text
+from ...reading import text_in
 from ...studies.sweep import LAST, TABLE, Sweep
 from ...studies.use_case import use_case
 from ...toml_reader import TomlTable
@@ -90,8 +90,8 @@ def table_of(call: Call, done: Finished) -> Outputs:
     """Table of a parameter study; raises InputError where it has no usable row."""
     path = done.folder / TABLE
     try:
-        rows = tuple(csv.DictReader(file_text(path).splitlines()))
-    except (OSError, UnicodeDecodeError, csv.Error) as error:
+        rows = tuple(csv.DictReader(text_in(path, TABLE, "evaluate this node again").splitlines()))
+    except csv.Error as error:
         raise InputError(f"cannot read {TABLE}: {error}", str(path), "evaluate this node again") from error
     found = StudyTable(_plan_of(call), done.folder, rows)
     if not found.done:
