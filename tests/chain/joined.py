@@ -17,11 +17,10 @@ from mu_addon.fem.embedding import embed
 from mu_addon.fem.equilibrium import Equilibrium
 from mu_addon.fem.laws import NeoHooke
 from mu_addon.fem.materials import Layer, Materials
+from mu_addon.fem.model import Model
 from mu_addon.fem.state import State
 from mu_addon.fem.unit_materials import materials_of
 from mu_addon.meshing.mesh import LATTICE, TET_EDGES, Mesh
-
-from ..fem.cavities import CavitiesModel
 
 if TYPE_CHECKING:
     from mu_addon.design.parameters import Unit
@@ -39,12 +38,13 @@ class FullModel:
     """A body of units one on the other, each with a pressure of its own, and rigid plates as stiff elements.
 
     mesh: one body; plate (4,): the corner nodes of the plate at the tip, height_mm: of its middle at rest.
-    model, equilibrium: its finite elements.
+    model, equilibrium: its finite elements; faces: number of each unit's in the mesh's cavity, in order.
     """
 
     mesh: Mesh
-    model: CavitiesModel
+    model: Model
     equilibrium: Equilibrium
+    faces: Sequence[int]
     plate: Array
     height_mm: float
 
@@ -60,7 +60,6 @@ class FullModel:
     def states(self, pressures_kPa: Sequence[Sequence[float]]) -> list[State]:
         """Equilibria at rows of pressures in kPa, each from the loaded body. Raises ConvergenceError."""
         found = []
-        self.model.shares = np.ones(len(self.model.shares))
         start = self.equilibrium.at_zero_pressure()
         for row in pressures_kPa:
             p = np.asarray(row, float) / 1e3
@@ -68,7 +67,7 @@ class FullModel:
             if largest == 0.0:
                 found.append(start)
                 continue
-            self.model.shares = p / largest
+            self.model._shares.assign(np.repeat(p / largest, self.faces))
             found.append(self.equilibrium.reach(largest, [start]))
         return found
 
@@ -184,7 +183,7 @@ def full_model(
         tied_to=np.concatenate([to for _, to, _ in padded]),
         tied_weights=np.concatenate([w for _, _, w in padded]),
     )
-    model = CavitiesModel(joined, counts, threads=threads)
+    model = Model(joined, threads=threads)
     pull = np.asarray(loads.tip_force_N, float)
     pull = pull + loads.tip_mass_g * GRAVITY_N_PER_G * np.asarray(loads.down, float)
     load = np.zeros_like(joined.nodes)
@@ -194,7 +193,7 @@ def full_model(
         load += length * gravity(joined, np.concatenate(density), np.asarray(loads.down, float))
     model.load = load if load.any() else None
     equilibrium = Equilibrium(model, Materials(tuple(layers)))
-    return FullModel(joined, model, equilibrium, corners, height)
+    return FullModel(joined, model, equilibrium, counts, corners, height)
 
 
 def _weights(corners: Array, points: Array) -> Array:
