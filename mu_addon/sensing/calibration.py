@@ -24,7 +24,7 @@ from scipy.special import stdtrit
 
 from ..errors import InputError
 from ..files import write_text
-from ..toml_reader import read_toml
+from ..toml_reader import TomlTable, read_toml
 from ..toml_writer import Commented, toml_text
 
 Array = np.ndarray[Any, Any]
@@ -381,6 +381,14 @@ def read_calibration(path: Path) -> Calibration:
     monotonic.
     """
     table = read_toml(path, "calibration", "give the calibration.toml that `calibrate` writes")
+    try:
+        return _calibration(table, path)
+    except InputError as error:
+        # A panel shows what is wrong alone, and not where.
+        raise InputError(f"the calibration is invalid: {error.what}", error.where, error.remedy) from None
+
+
+def _calibration(table: TomlTable, path: Path) -> Calibration:
     if table.take("version", int) != VERSION:
         what = f"version {table.values['version']} is not known"
         raise InputError(what, table.at("version"), "calibrate again")
