@@ -97,7 +97,7 @@ def test_killed_it_goes_on_to_the_same_digits_and_repeats_nothing(whole, file, t
         command("graph", file, "--out", out), stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL
     )
     # Into the second of the two runs.
-    while len(list(out.glob("nodes/*/cache/mesh-*"))) < 2:
+    while len(list(out.glob("nodes/*/cache/meshed-*"))) < 2:
         assert process.poll() is None
         time.sleep(0.005)
     worker = worker_of(out)
@@ -127,7 +127,7 @@ def test_killed_it_goes_on_to_the_same_digits_and_repeats_nothing(whole, file, t
             ["node 'b'", "takes a study, not a unit", "Simulate"],
         ),
         ("format = 1\n[nodes.a]\nkind='chambers'\nlinks={profile='a.chambers'}", ["node 'a'"]),
-        ("format = 1\nnodes = 1", ["there are no nodes"]),
+        ("format = 1\nnodes = 1", ["nodes is not a table"]),
         ("[[[", ["not TOML"]),
         ("\0", ["not TOML"]),
         (

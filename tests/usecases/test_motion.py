@@ -34,9 +34,9 @@ from mu_addon.report.motion_files import (
     write_sensitivity,
 )
 from mu_addon.report.pc2 import read_pc2, write_pc2
+from mu_addon.studies.unit_ranking import UnitStudy
 from mu_addon.usecases.simulate_and_place.candidates import solved
 from mu_addon.usecases.simulate_and_place.charts import angle_picture, delta_picture
-from mu_addon.usecases.simulate_and_place.mechanics import Mechanics
 from mu_addon.usecases.simulate_and_place.path_motion import PathMotions
 
 from . import made_up
@@ -62,7 +62,7 @@ def study(tmp_path_factory):
 def shown(folder, own, trajectory, paths, sensors=Waveguides):
     """Write the motion of some paths that are solved on a trajectory's mesh; return their solutions."""
     states = {round(s.pressure_kPa, 9): s for s in trajectory.solved}
-    painter = PathMotions(Mechanics(UNIT), own, trajectory.mesh, states)
+    painter = PathMotions(UnitStudy(unit=UNIT).mechanics, own, trajectory.mesh, states)
     found = []
     for number, path in enumerate(paths):
         one = solved(sensors(UNIT, trajectory.mesh, (), ANCHORS), number, [-10.0, 10.0, 20.0], states, 21)

@@ -14,7 +14,6 @@ import pytest
 
 from mu_addon.design.parameters import load_preset
 from mu_addon.meshing.settings import MeshSettings
-from mu_addon.placement.graph import Limits
 from mu_addon.studies.unit_ranking import UnitStudy
 
 from ...made_once import made_once
@@ -102,8 +101,8 @@ PLACE = {
     "mesh_check": False,
     "all_paths": True,
     "paths": "graph",
-    "limits": Limits(longest_cells=2.0),
-    "most_checks": 2,
+    "longest_cells": 2.0,
+    "checks": 2,
 }
 
 

@@ -24,7 +24,7 @@ from mu_addon.blender.unit import object as unit_object
 from mu_addon.blender.unit import preview_update as live
 from mu_addon.blender.unit.properties import to_unit
 from mu_addon.design.anchors import anchor_points
-from mu_addon.usecases.simulate_and_place.charts import write_angle, write_delta
+from mu_addon.usecases.simulate_and_place.charts import ANGLE, angle_picture, delta_name, delta_picture
 
 from .acting import add, refused
 from .drawing import drawn, panels_of
@@ -481,8 +481,12 @@ def test_candidates_say_their_rank(study):
 
 def test_panels_show_the_motion(study):
     # As a study's report writes them: that of the fixture has none.
-    write_angle(study, np.array([-20.0, 0.0, 40.0]), np.array([-3.3, 0.0, 6.3]))
-    write_delta(study, "alpha4", np.linspace(0.0, 0.1, 12).reshape(3, 4), np.arange(3.0), 0.1)
+    delta = np.linspace(0.0, 0.1, 12).reshape(3, 4)
+    for name, picture in (
+        (ANGLE, angle_picture(np.array([-20.0, 0.0, 40.0]), np.array([-3.3, 0.0, 6.3]))),
+        (delta_name("alpha4"), delta_picture("alpha4", delta, np.arange(3.0), 0.1)),
+    ):
+        (study / "motion" / name).write_bytes(picture.png)
     root = add(preset="mu-0.75x")
     panels = [kind for kind in panels_of(results_panel) if issubclass(kind, bpy.types.Panel)]
     assert drawn(panels).count("imulated") == 1, "once is enough"
