@@ -14,14 +14,14 @@ from mu_addon.run.progress import Progress
 # its watcher is less patient.
 HELD = """
 import ctypes, sys
-from mu_addon.cli import main, study
+from mu_addon.cli import main, studies
 from mu_addon.cli.watched import run_watched
 from mu_addon.run import heartbeat
 
 heartbeat.PATIENCE_S = 1.0
 
 
-def run(options, context):
+def run(kind, name, options, context):
     ctypes.PyDLL(None).sleep(5)
     context.progress.plan([("mesh", 100.0)])
     with context.progress.stage("mesh"):
@@ -29,7 +29,7 @@ def run(options, context):
         ctypes.PyDLL(None).sleep(5)
 
 
-study.run = run
+studies._run = run
 words = sys.argv[1:]
 sys.exit(run_watched(words, lambda: main.main(words)))
 """

@@ -80,7 +80,7 @@ def test_one_runs_the_others_wait_and_each_ends_with_a_notice(monkeypatch):
     watch(lambda: one.progress)
     assert (one.state, two.state) == ("running", "waiting")
     assert SIMULATION.is_running(second)
-    assert "motion (3 of 9)" in said()
+    assert "motion (3 of 10)" in said()
     assert "mu-1.0x: simulation: " in told("job_cancel", key=SIMULATION.key(first))
     assert "+1" in said()
     assert bpy.ops.mu.job_cancel() == {"FINISHED"}
@@ -151,7 +151,7 @@ def test_a_bar_is_short_whatever_a_stage_is_called(monkeypatch):
     child = started(root, "hang", monkeypatch)
     watch(lambda: child.progress)
     child.progress["stage"] = "candidates behind the third limit point"
-    assert "stage 3 of 9" in said()
+    assert "stage 3 of 10" in said()
     assert "limit point" not in said()
     everything = told("job_cancel", key=SIMULATION.key(root))
     assert "limit point" in everything

@@ -168,7 +168,7 @@ def test_path_resin_kind_and_struts_as_printed_are_asked_for_by_name(tmp_path):
         ("body-centred", "body-centred-straight"),
     ]  # fmt: skip
     kind.values = ""
-    assert "empty list" in refused(bpy.ops.mu.optimize)
+    assert "the list of values is empty" in refused(bpy.ops.mu.optimize)
 
 
 def test_the_users_own_body_goes_along(tmp_path):
