@@ -84,7 +84,7 @@ def test_every_input_has_its_name():
         "simulate.mesh.refine",
         "simulate.protocol",
         "protocol.factor",
-        "place.search.sharpest_bend_deg",
+        "place.bend_deg",
         "design.quality",
     ):
         assert name in known
@@ -105,7 +105,7 @@ def test_values_reach_the_study(tmp_path):
         assert (job.times, job.mesh_check, job.workers) == (7, False, 1)
         assert job.stations == v["place.stations"] in (11, 12, 13)
         assert job.protocol.pressure_kPa.max() == 40.0 * v["protocol.factor"]
-    assert len({job.text() for job in (p.job for p in points)}) > 1
+    assert len({job.texts()["study.toml"] for job in (p.job for p in points)}) > 1
 
 
 def test_a_range_in_its_logarithm_is_even_there():
