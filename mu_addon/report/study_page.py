@@ -93,6 +93,8 @@ def _one(work: Execution, part: Part) -> str:
         words = signed(escape(part.text))
         strong = signed(escape(part.strong))
         words = words.replace(strong, f"<strong>{strong}</strong>", 1) if strong else words
+        if part.heading:
+            return f"<h3>{words}</h3>"
         return f'<p class="answer">{words}</p>' if part.answer else f"<p>{words}</p>"
     if isinstance(part, Table):
         rows = [([*map(number, cells)], i in part.best) for i, cells in enumerate(part.rows)]

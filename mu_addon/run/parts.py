@@ -40,7 +40,7 @@ class Sentence:
     """A sentence; answer: it answers the study's question; terminal: it is printed at the end of a command.
 
     page: it stands in the report, with `note` in the box at its head; strong: words of it to be set off;
-    found: a first finding, told as soon as it is there.
+    found: a first finding, told as soon as it is there; heading: it stands over the parts that follow.
     """
 
     text: str
@@ -50,6 +50,7 @@ class Sentence:
     note: bool = False
     strong: str = ""
     found: bool = False
+    heading: bool = False
 
 
 def echo(*lines: str) -> list[Sentence]:

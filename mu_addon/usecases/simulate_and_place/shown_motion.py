@@ -176,6 +176,7 @@ def finished_motion_parts(
 
 def _stretch(tables: MotionTables, most: Mapping[str, Any], elongation: float, paint: Any) -> Iterator[Part]:
     """Stretch of wall and lattice: painted on the extreme states, and in numbers for all."""
+    yield Sentence("Stretch", heading=True)
     yield paint(0.01, "stretch", "largest principal stretch")
     if most:
         place = ", ".join(f"{x:.2f}" for x in most["place_mm"])
@@ -209,6 +210,7 @@ def _self_contact(
     if study.self_friction and instants is not None:
         lost = {"coefficient": study.self_friction, "lost_mJ": instants.lost_mJ}
         yield recorded("self_friction", lost)
+    yield Sentence("Self-contact", heading=True)
     if not any(row[2] for row in rows):
         yield Sentence("No wall or strut touches another at these pressures.")
         return
