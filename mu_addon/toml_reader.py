@@ -110,10 +110,10 @@ class TomlTable:
 
     def inner(self, key: str) -> TomlTable:
         """The table of a key, empty if it is not there; raises InputError for what is no table."""
-        found, name = self.values.get(key, {}), f"{self.name}.{key}" if self.name else key
-        if not isinstance(found, Mapping):
-            raise InputError(f"{key} is not a table", self.at(key), f"write it as a table, [{name}]")
-        return TomlTable(found, self.origin, self.text, name)
+        table = self._inner(key, self.values.get(key, {}))
+        if not isinstance(table.values, Mapping):
+            raise InputError(f"{key} is not a table", self.at(key), f"write it as a table, [{table.name}]")
+        return table
 
     def tables(self, key: str) -> list[TomlTable]:
         """The tables [[key]], which may be missing; raises InputError for what is no list of tables."""
@@ -235,9 +235,9 @@ class TomlTable:
             return float(value)
         if hint in _PLAIN and type(value) is hint:
             return value
-        what = "is not" if hint in _PLAIN or origin is tuple else "does not fit"
-        words = f" {_words(hint)}" if what == "is not" else ""
-        raise InputError(f"{key} = {value!r} {what}{words}", self.at(key), f"give {_words(hint)}")
+        words = _words(hint)
+        fault = f"is not {words}" if hint in _PLAIN or origin is tuple else "does not fit"
+        raise InputError(f"{key} = {value!r} {fault}", self.at(key), f"give {words}")
 
     def _inner(self, key: str, values: Mapping[str, Any]) -> TomlTable:
         name = f"{self.name}.{key}" if self.name else key

@@ -107,10 +107,10 @@ def add_scheduler(command: argparse.ArgumentParser) -> None:
     )
 
 
-def add_model(command: Group, text: str = "") -> None:
-    """--model, the result of a diagnosis; text: what it is for."""
+def add_model(command: Group) -> None:
+    """--model, the result of a diagnosis."""
     applied = "Extended model, the model.toml of `diagnose`: its identified effects are applied to the unit."
-    command.add_argument("--model", metavar="FILE", help=text or applied)
+    command.add_argument("--model", metavar="FILE", help=applied)
 
 
 def add_orientation(command: Group) -> None:
@@ -127,12 +127,6 @@ def add_device(command: Group) -> None:
     from ..fem.device import DEVICE
 
     add_setting(command, DEVICE, "cpu|cuda:0")
-
-
-def add_measured_folder(command: argparse.ArgumentParser, help_: str = "") -> None:
-    """FOLDER, a folder of measured data."""
-    words = help_ or "Folder of measured data: experiments.toml and its CSV files."
-    command.add_argument("folder", metavar="FOLDER", help=words)
 
 
 def add_obstacles(command: Group) -> None:
@@ -172,13 +166,6 @@ class _Friction(argparse.Action):
             parser.error("write --friction after its --obstacle")
         *before, (path, _) = namespace.obstacles
         namespace.obstacles = [*before, (path, value)]
-
-
-def add_self_contact(command: Group) -> None:
-    """--self-contact and --no-self-contact."""
-    from ..meshing.settings import SELF_CONTACT
-
-    add_setting(command, SELF_CONTACT)
 
 
 def require_out(options: argparse.Namespace) -> None:

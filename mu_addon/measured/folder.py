@@ -13,7 +13,6 @@ import numpy as np
 
 from ..errors import InputError
 from ..reading import file_bytes, text_in
-from ..run.inputs import digest
 from ..table_cells.own_tables import own_text
 from ..toml_reader import TomlTable, read_toml
 from .experiment import Array, Experiment
@@ -312,11 +311,6 @@ def _file(entry: TomlTable, folder: Path) -> Path:
             "keep a folder's files in it, so that it can be moved",
         )
     return folder / path
-
-
-def experiments_digest(measured: Measured) -> str:
-    """SHA-256 of the file that describes a folder's experiments."""
-    return digest(file_bytes(measured.folder / FILE))
 
 
 def described(measured: Measured) -> dict[str, list[str]]:

@@ -62,19 +62,6 @@ class Entry:
             Remark(r.what, Path(r.where.replace(scratch, "")).name, r.remedy) for r in measured.remarks
         )
 
-    def require_free(self, folder: Path) -> None:
-        """Raise InputError where another experiment of the folder has this name or this file."""
-        listed = folder / FILE
-        if not listed.exists() or self.block in file_text(listed):
-            return
-        same = [e for e in read_folder(folder).experiments if self.name == e.name or self.file == e.file.name]
-        if same:
-            raise InputError(
-                f"an experiment named {same[0].name!r}, in {same[0].file.name}, already exists",
-                str(listed),
-                "rename this experiment, or remove the other one",
-            )
-
 
 def added(entries: Sequence[Entry]) -> list[File]:
     """Parts that put experiments into a run's folder of measured data, beside those that it has.
@@ -84,8 +71,8 @@ def added(entries: Sequence[Entry]) -> list[File]:
 
     def table(path: Path, entry: Entry) -> str:
         # Before the first of them is written.
-        for one in entries if entry is entries[0] else ():
-            one.require_free(path.parent)
+        if entry is entries[0]:
+            _require_free(path.parent, entries)
         return entry.text
 
     def listed(path: Path) -> str:
@@ -95,3 +82,17 @@ def added(entries: Sequence[Entry]) -> list[File]:
         return text
 
     return [*(File(one.file, partial(table, entry=one)) for one in entries), File(FILE, listed)]
+
+
+def _require_free(folder: Path, entries: Sequence[Entry]) -> None:
+    """Raise InputError where another experiment of the folder has the name or the file of one of these."""
+    listed = folder / FILE
+    text = file_text(listed) if listed.exists() else None
+    new = [one for one in entries if text is not None and one.block not in text]
+    for other in read_folder(folder).experiments if new else ():
+        if any(other.name == one.name or other.file.name == one.file for one in new):
+            raise InputError(
+                f"an experiment named {other.name!r}, in {other.file.name}, already exists",
+                str(listed),
+                "rename this experiment, or remove the other one",
+            )

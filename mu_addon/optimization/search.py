@@ -16,6 +16,7 @@ from typing import Any
 import attrs
 import numpy as np
 
+from ..generators import value_of
 from .freedoms import Freedom
 from .settings import BATCH, EVALUATIONS, SEED
 from .surrogate import Surrogate, fit_all
@@ -91,14 +92,7 @@ def search_units(
 
     observe: computes designs.
     """
-    steps = Search(freedoms, targets, settings or SearchSettings()).steps(start)
-    asked = next(steps)
-    while True:
-        try:
-            asked = steps.send(observe(asked))
-        except StopIteration as end:
-            found: Found = end.value
-            return found
+    return value_of(Search(freedoms, targets, settings or SearchSettings()).steps(start), observe)
 
 
 class Search:

@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Generator
+from collections.abc import Callable, Generator, Sequence
 from typing import Any
 
 import attrs
 import numpy as np
 
 from ..errors import InputError
+from ..generators import value_of
 
 Array = np.ndarray[Any, Any]
 
@@ -75,29 +76,25 @@ def probability_of_better(predicted_mm: Array, exact_mm: Array) -> float:
 
 def search_paths(
     predicted_mm: Array,
-    check: Callable[[Array], Array],
+    check: Callable[[list[int]], Sequence[float]],
     settings: SearchSettings | None = None,
 ) -> Search:
     """Solve paths in the order of their predicted deviation until no other is likely to beat the best.
 
-    check: maps numbers (k,) of paths to their exact J_hat (k,) in mm, NaN for those that are impossible and
+    check: maps numbers of k paths to their exact J_hat (k,) in mm, NaN for those that are impossible and
     left out. Otherwise as `searching`; raises whatever `check` raises, too.
     """
-    search = searching(predicted_mm, settings)
-    now = next(search)
-    while True:
-        try:
-            now = search.send(check(now))
-        except StopIteration as end:
-            found: Search = end.value
-            return found
+    return value_of(searching(predicted_mm, settings), check)
 
 
-def searching(predicted_mm: Array, settings: SearchSettings | None = None) -> Generator[Array, Array, Search]:
-    """Yield numbers (k,) of paths to solve, get their exact J_hat (k,) in mm, and return the search.
+def searching(
+    predicted_mm: Array, settings: SearchSettings | None = None, J_mm: Callable[[Any], float] = float
+) -> Generator[list[int], Sequence[Any], Search]:
+    """Yield numbers of paths to solve, get the solution of each, and return the search.
 
-    predicted_mm (n,): positive predictions of J_hat. Raises InputError where a prediction is not positive or
-    no path is possible.
+    predicted_mm (n,): positive predictions of J_hat. J_mm: of a solution, its exact J_hat in mm, NaN of a
+    path that is impossible and left out. Raises InputError where a prediction is not positive or no path is
+    possible.
     """
     s = settings or SearchSettings()
     predicted_mm = np.asarray(predicted_mm, float)
@@ -110,7 +107,7 @@ def searching(predicted_mm: Array, settings: SearchSettings | None = None) -> Ge
     exact = np.full(len(order), np.nan)
     possible = np.ones(len(order), bool)
     while True:
-        exact[now] = yield now
+        exact[now] = [J_mm(one) for one in (yield now.tolist())]
         possible[now] = np.isfinite(exact[now])
         checked = int(np.isfinite(exact).sum())
         left = order[np.isnan(exact[order]) & possible[order]]

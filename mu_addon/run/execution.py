@@ -27,7 +27,7 @@ from .progress import Progress
 from .progress_estimate import LOADED, LOADED_S, Plan
 from .results import Results, Task
 from .stored import content
-from .study import SILENT, Dropped, Growth, Members, Section, Study
+from .study import Dropped, Growth, Members, Section, Study
 
 
 class Execution:
@@ -137,7 +137,6 @@ class Execution:
 
         Processes without work in it begin with that of later groups.
         """
-
         mine = {task for task in self.tasks if self._in_group(task, title, names)}
 
         def own(tasks: Iterable[Task]) -> list[Task]:
@@ -241,8 +240,7 @@ class Execution:
             if self.results.is_unknown(task, name):
                 return False
             for one in self.results.taken(task, name):
-                made = one in self._done if self._stages[name].title else self._is_ready(one)
-                if not made and name in self.results.members:
+                if name in self.results.members and not self._is_made(one):
                     return False
         return True
 
@@ -258,7 +256,7 @@ class Execution:
                 self.results.catch_up(self.results.failed, self.results.members)
             if not self.results.is_kept(task):
                 self.results.value(task)
-            message = stage.says(self.results.value(task)) if stage.says is not SILENT else ""
+            message = stage.says(self.results.value(task)) if stage.says else ""
         except Dropped:
             self.results.failed[task] = ""
         except (OutputError, WorkerDiedError):

@@ -35,8 +35,8 @@ def read_inputs(
     document = read_toml(path, *words)
     found = document.values.get("format")
     newer = isinstance(found, int) and not isinstance(found, bool) and found > version
-    words = "use the newer version that wrote it" if newer else "start it again in another folder"
-    document.of_format(version, words)
+    remedy = "use the newer version that wrote it" if newer else "start it again in another folder"
+    document.of_format(version, remedy)
     keys = {key: value for key, value in document.values.items() if key not in ("format", RUN)}
     return attrs.evolve(document, values=keys), dict(document.inner(RUN).values)
 

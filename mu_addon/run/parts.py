@@ -107,8 +107,8 @@ class Chart:
 class Pictures:
     """Pictures side by side, each also a file of the folder, if it has a name; make: name and picture.
 
-    shown: False of files that no page shows. scale: of the pictures' colours, above them, of which `make` is
-    called first.
+    shown: False of files that no page shows. scale: of the pictures' colours, above them; it is drawn after
+    them.
     """
 
     make: Callable[[], Sequence[tuple[str, Any]]]

@@ -33,6 +33,7 @@ from typing import TYPE_CHECKING, Any, ClassVar, Self
 import attrs
 
 from ..errors import InputError
+from ..generators import value_of
 from ..reading import file_bytes, parse_toml
 from ..toml_reader import TomlTable
 from .folder import RUN, FolderLayout
@@ -44,11 +45,11 @@ if TYPE_CHECKING:
 _INPUT, _STAGE, _DERIVED, _SECTION = "input", "_stage", "_derived", "_section"
 _NONE: Mapping[str, Any] = MappingProxyType({})
 TELL = "tell"
+"""Parameter by which a stage reports its progress: see `Tell`."""
 TARGETS = "stages"
 """Key of the table [run] for the targets of this run, where the folder has further ones."""
 REPORT_S = 5.0
 """Expected seconds of a report on two cores."""
-"""Parameter by which a stage reports its progress: see `Tell`."""
 
 
 @attrs.frozen
@@ -197,13 +198,7 @@ Growth = Generator[Sequence[Any], Sequence[Any], Any]
 
 def grown(growth: Growth, results: Mapping[Any, Any]) -> Any:
     """The value of a set's growth (`Over.grows`) with these results by member."""
-    asked: Sequence[Any] = ()
-    try:
-        asked = next(growth)
-        while True:
-            asked = growth.send([results[member] for member in asked])
-    except StopIteration as end:
-        return end.value
+    return value_of(growth, lambda asked: [results[member] for member in asked])
 
 
 @attrs.frozen
@@ -246,7 +241,7 @@ class Stage:
     failing: str
     parallel: bool
     again: Callable[[Any, Any], bool] | None
-    says: Callable[[Any], str]
+    says: Callable[[Any], str] | None
 
     @property
     def needs(self) -> tuple[str, ...]:
@@ -281,11 +276,6 @@ class Stage:
         return typing.get_type_hints(self.method)["return"]
 
 
-def SILENT(found: Any) -> str:
-    """No words on a result."""
-    return ""
-
-
 def stage(
     title: str,
     seconds: float | Mapping[str, float] | Callable[[Any], float] = 0.1,
@@ -297,7 +287,7 @@ def stage(
     revision: int = 1,
     parallel: bool = False,
     again: Callable[[Any, Any], bool] | None = None,
-    says: Callable[[Any], str] = SILENT,
+    says: Callable[[Any], str] | None = None,
 ) -> Callable[[Any], Any]:
     """A method that makes one result, or one for each member of a set; its `self` is None.
 
@@ -601,19 +591,29 @@ class Study:
         asked: the table [run] names the targets of this study. Raises InputError for a file of inputs that
         cannot be used.
         """
-        tables, run, files = self._written()
         path = folder / self.layout().inputs
-        if not self.commands or not path.is_file():
+        old = self._tables_in(folder)
+        if not old:
             return self.texts(), (), False
-        old, _, _ = self.read_tables(path)
-        further = tuple(target for target in self.commands if target in old and target not in tables)
+        tables, run, files = self._written()
         same = all(old[target].values == tables[target] for target in tables if target in old)
         more = self._named_files(path, old) if same else None
         if more is None:
-            return self.texts(), (), False
+            return {path.name: self._text(tables, run), **files}, (), False
+        further = self.further_in(folder, old)
         merged = tables | {target: dict(old[target].values) for target in further}
         run |= {TARGETS: list(tables)} if asked and further else {}
-        return {self.layout().inputs: self._text(merged, run), **more, **files}, further, True
+        return {path.name: self._text(merged, run), **more, **files}, further, True
+
+    def further_in(self, folder: Path, tables: Mapping[str, TomlTable] | None = None) -> tuple[str, ...]:
+        """Targets of a folder's file of inputs, or of its tables, that this study is not run for."""
+        found = self._tables_in(folder) if tables is None else tables
+        return tuple(target for target in found if target not in self.wanted_targets)
+
+    @classmethod
+    def _tables_in(cls, folder: Path) -> Mapping[str, TomlTable]:
+        path = folder / cls.layout().inputs
+        return cls.read_tables(path)[0] if cls.commands and path.is_file() else {}
 
     @classmethod
     def read_tables(

@@ -28,7 +28,7 @@ from ..run.study import (
     setting,
     stage,
 )
-from .inputs import MeasuredInput, ModelInput, UnitInput, asked
+from .inputs import FileInput, MeasuredInput, ModelInput, UnitInput, asked
 
 if TYPE_CHECKING:
     from ..usecases.diagnose.judged_data import JudgedData, Judging
@@ -54,10 +54,12 @@ Experiments = tuple["measured.Experiment", ...]
 
 
 @attrs.frozen
-class UnknownInput(Input):
+class UnknownInput(FileInput):
     """Parameters of the unit's design that nobody measured, by a file of [[freedom]] tables."""
 
     kind: str = "unknown"
+    text: Callable[[Any], str] = lambda unknown: unknown.text
+    needed: bool = False
 
     def made(self, values: tuple[Any, ...], given: Mapping[str, Any]) -> Unknown | None:
         """The parameters of a file; raises InputError."""
@@ -65,18 +67,10 @@ class UnknownInput(Input):
 
         return unknown_of(Path(values[0]), given["unit"] or design.load_preset(PRESET)) if values[0] else None
 
-    def write(self, name: str, value: Unknown | None) -> Written:
-        """The file's name, and its text."""
-        return Written({name: f"{name}.toml"}, files={f"{name}.toml": value.text}) if value else Written()
-
     def read(self, name: str, found: Found) -> Unknown | None:
         """The parameters of the folder's file, if it has one; raises InputError."""
         named = found.keys.pop(name, "")
         return self.made((found.path.parent / f"{name}.toml" if named else "",), found.given)
-
-    def file_names(self, name: str) -> tuple[str, ...]:
-        """Its file."""
-        return (f"{name}.toml",)
 
 
 @attrs.frozen

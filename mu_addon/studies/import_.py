@@ -16,10 +16,10 @@ import attrs
 from .. import lab_files, measured
 from ..design.quantity import described
 from ..errors import InputError
-from ..run.parts import Chart, Fault, Part, Sentence, Table, Warn, recorded
+from ..run.parts import Chart, Fault, Part, Sentence, Table, Warn, echo, recorded
 from ..run.study import Dropped, Input, Study, Tell, given, section, stage
 from ..toml_writer import toml_text
-from .inputs import OnceInput, PlaceInput, asked
+from .inputs import PlaceInput, asked, once
 
 PAGE = "import.html"
 # Choices that are written into the option which answers a question.
@@ -84,17 +84,12 @@ class Import(Study):
         repeated=True,
         metavar="KEY=VALUE",
     )
-    dry: bool = given(
-        OnceInput(
-            descriptions=(
-                described(
-                    "dry_run",
-                    False,
-                    "show how the files were read, in the terminal and in import.html, and import nothing",
-                ),
-            )
-        ),
-        default=False,
+    dry: bool = once(
+        described(
+            "dry_run",
+            False,
+            "show how the files were read, in the terminal and in import.html, and import nothing",
+        )
     )
     ask: Ask | None = given(Input("ask"), default=None)
     """Answers open questions by their keys; else they end the run, after the page is written."""
@@ -143,12 +138,11 @@ class Import(Study):
     ) -> Iterator[Part]:
         """The experiments, or the questions that are open."""
         questions = [_asked(p, question) for p, question in understood.asked]
-        for line in terminal_lines(understood):
-            yield Sentence(line, terminal=True, page=False)
-        yield Sentence(f"how the files were read, with pictures: {PAGE}", terminal=True, page=False)
+        lines = terminal_lines(understood)
+        yield from echo(*lines, f"how the files were read, with pictures: {PAGE}")
         yield recorded("experiments", {p.name: _figures(p) for p in understood.proposals})
         yield recorded("left_out", list(understood.left_out))
-        yield recorded("understood", terminal_lines(understood))
+        yield recorded("understood", lines)
         if questions:
             yield Sentence(f"Not imported yet. {len(understood.open)} question(s) are open:", note=True)
             for p, question in understood.open:
@@ -156,8 +150,7 @@ class Import(Study):
         if dry:
             yield recorded("dry_run", True)
             yield recorded("questions", questions)
-            for line in (*(f"open: {words}" for words in questions), "dry run: nothing was imported"):
-                yield Sentence(line, terminal=True, page=False)
+            yield from echo(*(f"open: {words}" for words in questions), "dry run: nothing was imported")
         elif questions:
             yield Fault(_open_questions(understood, questions))
         if ready is not None:

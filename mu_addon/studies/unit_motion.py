@@ -24,7 +24,6 @@ from .unit_inputs import BodyInput, EffectsInput, MeshInput, ObstaclesInput, Pro
 
 AROUND, SOLVER = "unit and surroundings", "mesh and solver"
 STAGES = ("design", "simulate", "place")
-Row = tuple[str, ...]
 
 
 def _wants(target: str) -> Any:

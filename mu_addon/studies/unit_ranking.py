@@ -80,6 +80,16 @@ def _way(study: UnitStudy, member: core.Member) -> Mapping[str, Any]:
     return {"states": [p for p in study.samples.distinct_kPa if p in every]}
 
 
+def _number(study: UnitStudy, path: str) -> Mapping[str, Any]:
+    """A candidate's number."""
+    return {"number": study.compared.names.index(path)}
+
+
+def _at_pressures(study: UnitStudy, member: core.Member) -> Mapping[str, Any]:
+    """A candidate's number, and the pressures in kPa that it is solved at together."""
+    return {**_number(study, member[0]), "pressures_kPa": member[1]}
+
+
 def _extremes(study: UnitStudy, first_ranking: core.Ranking) -> Growth:
     yield core.extremes(study.samples.pressure_kPa[first_ranking.compared]).tolist()
 
@@ -188,14 +198,14 @@ class UnitStudy(UnitMotion):
         return design.windows(self.unit.chambers.count)
 
     @cached_property
-    def candidates_paths(self) -> tuple[placement.Candidate, ...]:
+    def candidate_paths(self) -> tuple[placement.Candidate, ...]:
         """The candidate paths."""
         return tuple(placement.candidate_paths(design.anchor_points(self.unit), self.windows))
 
     @property
     def compared(self) -> core.Comparison:
         """What candidates are compared at."""
-        names = tuple(one.name for one in self.candidates_paths)
+        names = tuple(one.name for one in self.candidate_paths)
         return core.Comparison(names, self.samples, self.effects.has_gravity)
 
     @property
@@ -230,7 +240,7 @@ class UnitStudy(UnitMotion):
             ("what",), lambda study: ["estimate"], needs=lambda study, _: {"states": _under_pressure(study)}
         ),
         wanted=lambda study: (
-            _by_pressure(study) and len(study.candidates_paths) > 1 and bool(_under_pressure(study))
+            _by_pressure(study) and len(study.candidate_paths) > 1 and bool(_under_pressure(study))
         ),
         parallel=True,
         says=lambda found: core.words_on_estimates(found),
@@ -252,20 +262,21 @@ class UnitStudy(UnitMotion):
 
     @intermediate()
     def waveguides(
-        self, meshed: meshing.Mesh, mechanics: core.Mechanics, candidates_paths: Any, sensor: Any
+        self, meshed: meshing.Mesh, mechanics: core.Mechanics, candidate_paths: Any, sensor: Any
     ) -> Any:
         """Solver of the candidates."""
-        return core.waveguides_of(mechanics, meshed, candidates_paths)
+        return core.waveguides_of(mechanics, meshed, candidate_paths)
 
     @stage(
         "candidates",
         taking("candidates"),
         over=Over(
-            ("path", "pressures_kPa"),
+            ("number", "pressures_kPa"),
             lambda study: [],
             _way,
+            _at_pressures,
             grows=lambda study: core.solving(study.compared, study.contest),
-            most=lambda study: 2 * len(study.candidates_paths),
+            most=lambda study: 2 * len(study.candidate_paths),
         ),
         wanted=_by_pressure,
         parallel=True,
@@ -273,15 +284,13 @@ class UnitStudy(UnitMotion):
     )
     def candidates(
         self,
-        path: str,
+        number: int,
         pressures_kPa: tuple[float, ...],
         states: Members,
         waveguides: Any,
-        candidates_paths: Any,
         stations: int,
     ) -> core.Solved:
         """A candidate at some pressures, from Model A's states there."""
-        number = [one.name for one in candidates_paths].index(path)
         return core.solved(waveguides, number, pressures_kPa, states, stations)
 
     @intermediate()
@@ -294,19 +303,17 @@ class UnitStudy(UnitMotion):
         "candidates",
         taking("candidates"),
         over=Over(
-            ("path", "pressures_kPa"),
+            ("number", "pressures_kPa"),
             lambda study: [],
+            gives=_at_pressures,
             grows=lambda study, standing: core.following(study.compared, standing),
             after=("standing",),
         ),
         wanted=_by_pressure,
         parallel=True,
     )
-    def followed(
-        self, path: str, pressures_kPa: tuple[float, ...], waveguides: Any, candidates_paths: Any
-    ) -> core.Followed:
+    def followed(self, number: int, pressures_kPa: tuple[float, ...], waveguides: Any) -> core.Followed:
         """A candidate along its whole path from rest."""
-        number = [one.name for one in candidates_paths].index(path)
         return core.followed(waveguides, number, pressures_kPa)
 
     @intermediate()
@@ -322,13 +329,12 @@ class UnitStudy(UnitMotion):
     @stage(
         "candidates",
         taking("candidates"),
-        over=Over(("path",), lambda study: [one.name for one in study.candidates_paths]),
+        over=Over(("number",), lambda study: study.compared.names, gives=_number),
         wanted=_in_time,
         parallel=True,
     )
-    def marched(self, path: str, waveguides: Any, candidates_paths: Any, samples: core.Samples) -> core.Array:
+    def marched(self, number: int, waveguides: Any, samples: core.Samples) -> core.Array:
         """Anchors (k, p, 3) in mm of a candidate at each instant, as far as it has an equilibrium."""
-        number = [one.name for one in candidates_paths].index(path)
         return core.marched(waveguides, number, samples)
 
     @intermediate(wanted=_places)
@@ -372,10 +378,10 @@ class UnitStudy(UnitMotion):
 
     @intermediate()
     def coarse_waveguides(
-        self, coarse_mesh: meshing.Mesh, mechanics: core.Mechanics, candidates_paths: Any, sensor: Any
+        self, coarse_mesh: meshing.Mesh, mechanics: core.Mechanics, candidate_paths: Any, sensor: Any
     ) -> Any:
         """Solver of the candidates on the coarser mesh."""
-        return core.waveguides_of(mechanics, coarse_mesh, candidates_paths)
+        return core.waveguides_of(mechanics, coarse_mesh, candidate_paths)
 
     @stage(
         "mesh check",
@@ -394,9 +400,10 @@ class UnitStudy(UnitMotion):
         "mesh check",
         taking("mesh check"),
         over=Over(
-            ("path", "pressures_kPa"),
+            ("number", "pressures_kPa"),
             lambda study: [],
             lambda study, member: {"coarse_states": list(member[1])},
+            _at_pressures,
             grows=_best_on_coarse,
             after=("first_ranking",),
         ),
@@ -406,15 +413,13 @@ class UnitStudy(UnitMotion):
     )
     def coarse_candidates(
         self,
-        path: str,
+        number: int,
         pressures_kPa: tuple[float, ...],
         coarse_states: Members,
         coarse_waveguides: Any,
-        candidates_paths: Any,
         stations: int,
     ) -> core.Solved:
         """One of the best candidates at the extreme pressures that the coarser mesh reaches."""
-        number = [one.name for one in candidates_paths].index(path)
         return core.solved(coarse_waveguides, number, [*coarse_states], coarse_states, stations, whole=False)
 
     @stage(
@@ -442,16 +447,15 @@ class UnitStudy(UnitMotion):
     @stage(
         "mesh check",
         taking("mesh check"),
-        over=Over(("path",), lambda study: [], grows=_best_in_time, after=("first_ranking",)),
+        over=Over(
+            ("number",), lambda study: [], gives=_number, grows=_best_in_time, after=("first_ranking",)
+        ),
         wanted=_checks_in_time,
         failing="The mesh uncertainty is not known: on the coarser mesh",
         parallel=True,
     )
-    def coarse_marched(
-        self, path: str, coarse_waveguides: Any, candidates_paths: Any, samples: core.Samples
-    ) -> core.Array:
+    def coarse_marched(self, number: int, coarse_waveguides: Any, samples: core.Samples) -> core.Array:
         """Anchors (k, p, 3) in mm of one of the best candidates at each instant on the coarser mesh."""
-        number = [one.name for one in candidates_paths].index(path)
         return core.marched(coarse_waveguides, number, samples)
 
     @intermediate()
@@ -484,9 +488,10 @@ class UnitStudy(UnitMotion):
         "candidates",
         taking("candidates"),
         over=Over(
-            ("path", "pressures_kPa"),
+            ("number", "pressures_kPa"),
             lambda study: [],
             _way,
+            _at_pressures,
             grows=lambda study, *found: core.letting_in(study.compared, study.contest, *found),
             after=("standing", "path_check", "uncertainty"),
         ),
@@ -496,15 +501,13 @@ class UnitStudy(UnitMotion):
     )
     def let_in(
         self,
-        path: str,
+        number: int,
         pressures_kPa: tuple[float, ...],
         states: Members,
         waveguides: Any,
-        candidates_paths: Any,
         stations: int,
     ) -> core.Solved:
         """A candidate that the mesh uncertainty does not tell from the best, at what it lacks."""
-        number = [one.name for one in candidates_paths].index(path)
         return core.solved(waveguides, number, pressures_kPa, states, stations)
 
     @intermediate()
@@ -558,7 +561,7 @@ class UnitStudy(UnitMotion):
     @stage(
         "motion of the paths",
         taking("motion of the paths"),
-        over=Over(("path",), lambda study: [one.name for one in study.candidates_paths]),
+        over=Over(("path",), lambda study: study.compared.names),
         wanted=_by_pressure,
         kept=False,
     )
@@ -727,7 +730,7 @@ class UnitStudy(UnitMotion):
 
     @section("ranking", "Ranking of the paths", order=-1)
     def estimated(self, estimates: Members, first_ranking: core.Ranking | None = None) -> Iterator[Part]:
-        """Estimates of the deviations, state_message at once, and shown as long as no path is solved."""
+        """Estimates of the deviations, shown at once, and on the page as long as no path is solved."""
         for found in estimates.values():
             yield recorded(core.ESTIMATED, found)
             words = core.words_on_estimates(found)

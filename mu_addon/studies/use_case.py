@@ -92,7 +92,7 @@ def run(job: Study, folder: Path, context: RunContext) -> Execution:
         work.opening = partial(context.open_folder, folder)
     else:
         context.summary["versions"] = package_versions()
-    if job.page and not (work.study.texts_in(folder)[1] and (folder / job.page).is_file()):
+    if job.page and not (work.study.further_in(folder) and (folder / job.page).is_file()):
         context.report = lambda stopped: write_page(work, stopped)
     context.console_summary = lambda summary: work.lines
     work.run()

@@ -22,7 +22,7 @@ _CORNERS, (_FACES,) = _CUBE.vertices, _CUBE.faces
 
 def painted_on(root: Any) -> Any | None:
     """The object that a unit's factors are painted on, or None."""
-    return next((child for child in root.children if child.get(displays.PAINTED)), None)
+    return displays.part(root, displays.PAINTED, "struts")
 
 
 def begin(root: Any, field: Field) -> Any:

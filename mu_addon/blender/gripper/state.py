@@ -59,7 +59,7 @@ GRASPING = StudyJob(
     _given,
     "mu_gripper",
     {name: name for name in ("density_g_per_ml", "friction", "self_contact")},
-    made_of=lambda summary: summary.get("grasps", {}),
+    made_of=lambda summary, folder: summary.get("grasps", {}),
     beside=("cubes_mm", "coarse", "refine", "self_contact", "solid_only", "quality"),
     claim=_claim,
 )

@@ -10,9 +10,7 @@ from bpy.props import BoolProperty, CollectionProperty, StringProperty
 from ...design.printing.finding import counted
 from ...errors import InputError, MuError
 from ...files import make_folder
-from ...run.context import RunContext
-from ...run.execution import Execution
-from ...run.progress import Progress
+from ..jobs.here import run_here
 from ..shared import viewports
 from ..shared.operators import open_file, operator
 from ..shared.panels import wrapped
@@ -128,10 +126,9 @@ def _import(operator, root):
 
     state = root.mu_import
     given = {one.key: one.value.strip() for one in state.answers if one.answered}
-    files, folder, messages = tuple(map(Path, state.files.split("\n"))), _folder(root), []
+    files, folder = tuple(map(Path, state.files.split("\n"))), _folder(root)
     make_folder(folder)
-    work = Execution(Import(paths=files, answers=given), folder, RunContext(Progress([messages.append])))
-    work.run()
+    work, warnings = run_here(Import(paths=files, answers=given), folder)
     write_page(work)
     found = work.results.value(("understood", None))
     if work.fault is not None:
@@ -146,11 +143,9 @@ def _import(operator, root):
         return {"FINISHED"}
     root.mu_evidence.folder = str(folder)
     _forget(root)
-    remarks = [message for message in messages if message["type"] == "warning"]
-    for remark in remarks[:3]:
-        operator.report({"WARNING"}, f"{remark['what']} ({remark['where']})")
+    for warning in warnings[:3]:
+        operator.report({"WARNING"}, f"{warning['what']} ({warning['where']})")
     operator.report({"INFO"}, counted(len(found.proposals), "experiment", "experiments") + " imported")
-    viewports.redraw()
     return {"FINISHED"}
 
 

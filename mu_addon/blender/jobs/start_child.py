@@ -154,8 +154,7 @@ class JobKind:
 
     def is_running(self, root: Any) -> bool:
         """Return True if the job runs, or waits for another one."""
-        job = _jobs.get(self.key(root))
-        return job is not None and job.runs
+        return runs(self.key(root))
 
     def start(
         self, root: Any, folder: Path, write_inputs: Callable[[Path], None], options: Sequence[str] = ()
@@ -185,6 +184,11 @@ class JobKind:
 def child_of(key: str) -> Child | None:
     """The latest child of the job of that key, running or ended, or None."""
     return _jobs[key].child if key in _jobs else None
+
+
+def runs(key: str) -> bool:
+    """Return True if the job of that key runs, or waits for another one."""
+    return key in _jobs and _jobs[key].runs
 
 
 def running() -> list[Job]:
@@ -304,7 +308,7 @@ def _end_all() -> None:
 def _take_up() -> None:
     """Watch the jobs of former sessions, running or ended."""
     for record in lasting_jobs.take_up():
-        if record.key in [job.key for job in running()]:
+        if runs(record.key):
             continue
         try:
             child = FoundChild(record.run, record.run / OWN_FOLDER, record.plan, record.started_s)

@@ -19,7 +19,7 @@ import numpy as np
 from ...errors import InputError, MuError
 from ...placement.sampling import polynomials
 from ...reading import file_bytes, parse_json
-from ...report.motion_files import REGIONS, Motion, read_motion
+from ...report.motion_files import Motion, read_motion
 from ...run.child import RUNNING, Child
 from ...run.folder import write_run
 from ..jobs import start_child
@@ -293,8 +293,8 @@ def _answered(root: Any, live: Live) -> bool:
 
 def _shape(root: Any, motion: Motion, answer: dict[str, Any], design: str) -> Shape:
     cut = bool(root.mu_unit.cut and motion.halved)
-    vertices, triangles = bodies.of_motion(motion, cut)
-    skins = {region: motion.skin(region, cut) for region in REGIONS}
+    skins = bodies.skins_of(motion, cut)
+    vertices, triangles = bodies.of_motion(motion, skins)
     fields = {
         region: {name: skin.of_surface(v) for name, v in motion.fields[region].items()}
         for region, skin in skins.items()

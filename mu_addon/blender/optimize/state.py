@@ -259,22 +259,18 @@ def findings(root: Any) -> Findings | None:
     known = OPTIMIZE.found(root)
     if known is None:
         return None
-    found, folder, now = known.content, known.folder, _now(root)
-    files = [folder / p.file for p in found.proposed]
-    proposed = tuple(
-        attrs.evolve(p, file=file, applied=_hash_of(file) == now)
-        for p, file in zip(found.proposed, files, strict=True)
-    )
-    other = now != _hash_of(folder / UNIT) and not any(p.applied for p in proposed)
-    return attrs.evolve(found, folder=folder, proposed=proposed, other_start=other)
+    found, now = known.content, _now(root)
+    proposed = tuple(attrs.evolve(p, applied=_hash_of(p.file) == now) for p in found.proposed)
+    other = now != _hash_of(found.folder / UNIT) and not any(p.applied for p in proposed)
+    return attrs.evolve(found, proposed=proposed, other_start=other)
 
 
 def _hash_of(file: Path) -> str | None:
     return _units.read([file], lambda: shape_hash(as_kept(read_unit(file))))
 
 
-def _read(summary: Any) -> Findings:
-    """Results by summary.json; their folder is not known here."""
+def _read(summary: Any, folder: Path) -> Findings:
+    """Results by summary.json, in their folder."""
     found, proposed = dict(summary), []
     for number, row in enumerate(map(dict, found.get("proposed") or ()), 1):
         targets = tuple(
@@ -282,9 +278,9 @@ def _read(summary: Any) -> Findings:
             for t in row.get("targets") or ()
         )
         texts = (tuple(map(str, row.get(key) or ())) for key in ("changes", "reasons"))
-        proposed.append(Proposed(number, Path(Path(str(row["file"])).name), targets, *texts))
+        proposed.append(Proposed(number, folder / Path(str(row["file"])).name, targets, *texts))
     return Findings(
-        Path(),
+        folder,
         str(found.get("status", "")),
         found.get("feasible") is True,
         str(found.get("outcome", "")),

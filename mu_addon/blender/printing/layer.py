@@ -26,7 +26,7 @@ _kept: dict[tuple[Any, ...], Layers] = {}
 
 def layer_object(root: Any) -> Any | None:
     """The object that shows a layer of a unit, or None."""
-    return next((child for child in root.children if displays.LAYER in child), None)
+    return displays.part(root, displays.LAYER, "1")
 
 
 def facts(shown: Any) -> dict[str, float]:

@@ -26,7 +26,7 @@ MATERIAL = {"error": "MU Flaws", "warning": "MU Doubt"}
 
 def mark_objects(root: Any) -> list[Any]:
     """Objects that mark the findings of a check."""
-    return [child for child in root.children if MARK in child]
+    return displays.parts(root, MARK)
 
 
 def marked(root: Any) -> str:
@@ -36,8 +36,7 @@ def marked(root: Any) -> str:
 
 def clear(root: Any) -> None:
     """Remove the marks."""
-    for obj in mark_objects(root):
-        displays.remove(obj)
+    displays.clear(root, MARK)
     root.mu_print.finding = -1
 
 

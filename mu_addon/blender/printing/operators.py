@@ -163,12 +163,9 @@ def print_up(root, direction):
     root.mu_print.up = direction
 
 
-def _print_layer_trouble(root):
-    built = unit_object.solid_is_current(root)
-    return "" if built else "Build the solid first"
-
-
-@operator(ValidUnitOperator, "Show Layer", trouble=_print_layer_trouble)
+@operator(
+    ValidUnitOperator, "Show Layer", trouble=unless(unit_object.solid_is_current, "Build the solid first")
+)
 def print_layer(root):
     """Show a layer of the solid along the build direction Up: material in yellow, enclosed areas in blue"""
     layer.put(root)

@@ -233,7 +233,7 @@ def _file_stale(root: Any, folder: Path) -> str:
     return "" if file and asked else "made of another file, or asked otherwise"
 
 
-def _places(check: dict[str, Any]) -> dict[str, Any]:
+def _places(check: dict[str, Any], folder: Path) -> dict[str, Any]:
     """A check with its findings by severity, their places as (n, 3)."""
     for finding in check["findings"]:
         finding["places"] = np.array(finding["places"], float).reshape(-1, 3)
@@ -278,7 +278,7 @@ EXPORT = _job(
     fields={"quality": "quality"},
     hindered=_not_exported,
     result="manifest.json",
-    made_of=lambda found: {name: found[name] for name in ("resin", "files", "refused", "vents")},
+    made_of=lambda found, folder: {name: found[name] for name in ("resin", "files", "refused", "vents")},
     beside=("formats",),
     stale=lambda root, folder: "made with other parameters" if own_body(root) else None,
 )

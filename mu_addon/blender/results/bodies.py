@@ -13,14 +13,18 @@ from ..preview import skeletons
 from ..shared import displays
 
 
-def of_motion(motion: Motion, cut: bool) -> tuple[dict[str, Any], dict[str, Any]]:
-    """Vertices (s, v, 3) in mm at each state of Model A and triangles (t, 3), by region; cut: of a half."""
-    vertices, triangles = {}, {}
-    for region in REGIONS:
-        skin = motion.skin(region, cut)
-        moved = skin.of_nodes(motion.mesh.nodes) + skin.of_nodes(motion.model_a)
-        vertices[region], triangles[region] = moved.astype(np.float32), skin.triangles
-    return vertices, triangles
+def skins_of(motion: Motion, cut: bool) -> dict[str, Any]:
+    """Surface of each region; cut: of a half."""
+    return {region: motion.skin(region, cut) for region in REGIONS}
+
+
+def of_motion(motion: Motion, skins: Mapping[str, Any]) -> tuple[dict[str, Any], dict[str, Any]]:
+    """Vertices (s, v, 3) in mm at each state of Model A and triangles (t, 3), of surfaces by region."""
+    vertices = {
+        region: (skin.of_nodes(motion.mesh.nodes) + skin.of_nodes(motion.model_a)).astype(np.float32)
+        for region, skin in skins.items()
+    }
+    return vertices, {region: skin.triangles for region, skin in skins.items()}
 
 
 def put(

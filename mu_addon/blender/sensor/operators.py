@@ -168,20 +168,16 @@ def sensor_hold(root):
     viewports.redraw()
 
 
-class MU_OT_sensor_back(SessionOperator, bpy.types.Operator):
+def _sensor_back_trouble(root):
+    guide = sensor.of(root).guide
+    return "" if guide is not None and guide.held else "No angle was held yet"
+
+
+@operator(SessionOperator, "Back", undo=False, trouble=_sensor_back_trouble)
+def sensor_back(root):
     """Take back the last angle of the guided sweep, to hold it again"""
-
-    bl_label = "Back"
-    bl_options = {"REGISTER"}
-
-    @classmethod
-    def trouble(cls, root):
-        guide = None if super().trouble(root) else sensor.of(root).guide
-        return super().trouble(root) or ("" if guide is not None and guide.held else "No angle was held yet")
-
-    def act(self, context, root):
-        sensor.back(sensor.of(root))
-        viewports.redraw()
+    sensor.back(sensor.of(root))
+    viewports.redraw()
 
 
 @operator(
@@ -211,7 +207,6 @@ def sensor_calibrate(root, data, channel):
     if not data:
         raise InputError("no folder is chosen", "Sweeps", "choose a recording with marks, or measured data")
     sensor.calibrate(root, Path(bpy.path.abspath(data)))
-    viewports.redraw()
 
 
 @operator(SessionOperator, "Zero", undo=False)

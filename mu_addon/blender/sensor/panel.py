@@ -179,7 +179,7 @@ def _calibration(layout, root, session):
     body.prop(settings, "dark", placeholder=str(dark))
     body.prop(settings, "calibration")
     child = sensor.CALIBRATION.child(root)
-    job_state(body, child, "now in use", "sensor_")
+    job_state(body, child, "now in use", sensor.CALIBRATION.prefix)
     if child is not None and child.state == FAILED and session is not None:
         others = [name for name in session.channels if name not in (light, dark)]
         for name in others[:3]:

@@ -283,7 +283,7 @@ def _apply_finished(key: str, folder: Path) -> bool:
 def _poll() -> float | None:
     sampled, news = poll()
     if sampled or news:
-        viewports.redraw_regions("WINDOW", *["UI"] * news)
+        viewports.redraw_regions("WINDOW", *(["UI"] if news else []))
     busy = _calibrating or any(session.running for session in _sessions.values())
     return INTERVAL_S if busy else None
 

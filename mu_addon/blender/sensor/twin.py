@@ -65,7 +65,8 @@ def _shape(root: Any) -> _Shape:
     cut = bool(root.mu_motion.cut and motion.halved)
     kept = _shapes.get((motion.folder, cut))
     if kept is None or kept.motion is not motion:
-        kept = _shapes[motion.folder, cut] = _Shape(motion, poses(motion), *bodies.of_motion(motion, cut))
+        shapes = bodies.of_motion(motion, bodies.skins_of(motion, cut))
+        kept = _shapes[motion.folder, cut] = _Shape(motion, poses(motion), *shapes)
     return kept
 
 

@@ -147,9 +147,9 @@ def operator(
 ) -> Callable[[Any], Any]:
     """A function as the operator of its name, its docstring in the tooltip; the function stays as it is.
 
-    base: a `RootOperator`; trouble: of a root, further reason why it cannot run; properties: of the operator,
-    by name. The function's parameters name what it is given: `context`, `root` (or `base.root_name`),
-    properties, or the `operator` itself. It returns what `RootOperator.act` does.
+    base: a `RootOperator` or `FreeOperator`; trouble: of a root, further reason why it cannot run;
+    properties: of the operator, by name. The function's parameters name what it is given: `context`, `root`
+    (or `base.root_name`), properties, or the `operator` itself. It returns what `RootOperator.act` does.
     """
 
     def made(function: Any) -> Any:

@@ -70,10 +70,13 @@ def _hooks(module: Any) -> Iterator[Hook]:
     yield from _declared.get(module.__name__, {}).values()
 
 
+def _idname(operator: Any) -> str:
+    return f"mu.{operator.__name__.removeprefix('MU_OT_')}"
+
+
 def _class(cls: Any) -> Hook:
     if "bl_idname" not in vars(cls):
-        name = cls.__name__
-        cls.bl_idname = f"mu.{name.removeprefix('MU_OT_')}" if issubclass(cls, bpy.types.Operator) else name
+        cls.bl_idname = _idname(cls) if issubclass(cls, bpy.types.Operator) else cls.__name__
     rank = _PROPERTIES if issubclass(cls, bpy.types.PropertyGroup) else _CLASSES
     return Hook(rank, lambda: bpy.utils.register_class(cls), lambda: bpy.utils.unregister_class(cls))
 
@@ -123,17 +126,16 @@ def handler(*events: str) -> Callable[[Any], Any]:
     return mark
 
 
-def connected(*signals: Signal) -> Callable[[Any], Any]:
-    """A function that signals call."""
+def connected(signal: Signal) -> Callable[[Any], Any]:
+    """A function that a signal calls."""
 
     def mark(function: Any) -> Any:
-        for number, signal in enumerate(signals):
-            _declare(
-                function.__module__,
-                f"{function.__name__} signal {number}",
-                lambda signal=signal: signal.connect(function),
-                lambda signal=signal: signal.disconnect(function),
-            )
+        _declare(
+            function.__module__,
+            f"{function.__name__} signal",
+            lambda: signal.connect(function),
+            lambda: signal.disconnect(function),
+        )
         return function
 
     return mark
@@ -160,7 +162,7 @@ def button(*places: str, icon: str = "NONE") -> Callable[[Any], Any]:
     """An operator, a class or a function, with a button at the end of panels and menus of these names."""
 
     def mark(made: Any) -> Any:
-        name = f"mu.{made.__name__.removeprefix('MU_OT_')}"
+        name = _idname(made)
 
         def draw(self: Any, context: Any) -> None:
             self.layout.operator(name, icon=icon)

@@ -8,7 +8,6 @@ from ...usecases.simulate_and_place import unit_runs
 from ...usecases.simulate_and_place.settings import QUICK
 from ..jobs import start_child
 from ..jobs.operators import FILES, job_operators
-from ..shared import viewports
 from ..shared.blender_property import blender_property
 from ..shared.operators import operator
 from ..unit.base_classes import ValidUnitOperator
@@ -47,7 +46,6 @@ def simulate(root, quick):
     options = ["--device", study.device]
     kind = attrs.evolve(SIMULATION, plan_of=lambda root: plan_of(root, quick))
     kind.start(root, folder, lambda folder: write_study(job, folder), options)
-    viewports.redraw()
 
 
 CLASSES = job_operators(SIMULATION, "simulate first", path_of=_file_of)

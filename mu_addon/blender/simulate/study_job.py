@@ -49,9 +49,9 @@ class StudyJob:
     study: its name; kind: of the job, which several studies of an object may share; folder_of: folder of its
     run; given: its inputs by name, raises MuError; fields: property by input, of the group `group`; hindered:
     why it cannot start, beside what its inputs say; result: file that is shown, made by `made_of` of its
-    JSON; beside: inputs that leave the result valid. stale: the reason, where `given` takes long or differs
-    (None: by the inputs); claim: called before the start; texts: of its inputs' files, for the job to check,
-    where its inputs take long to make.
+    JSON and its folder; beside: inputs that leave the result valid. stale: the reason, where `given` takes
+    long or differs (None: by the inputs); claim: called before the start; texts: of its inputs' files, for
+    the job to check, where its inputs take long to make.
     """
 
     study: str
@@ -63,7 +63,7 @@ class StudyJob:
     hindered: Callable[[Any], str] = lambda root: ""
     needed: Sequence[str] = SOLVER
     result: str = SUMMARY
-    made_of: Callable[[Any], Any] = lambda content: content
+    made_of: Callable[[Any, Path], Any] = lambda content, folder: content
     beside: Sequence[str] = ()
     stale: Callable[[Any, Path], str | None] = lambda root, folder: None
     quick: Callable[[Any], bool] = lambda root: True
@@ -138,7 +138,7 @@ class StudyJob:
 
         def read() -> tuple[Any, str]:
             content = file_bytes(path)
-            return self.made_of(parse_json(content, path.name)), hashlib.sha256(content).hexdigest()
+            return self.made_of(parse_json(content, path.name), folder), hashlib.sha256(content).hexdigest()
 
         known = self._read.read([path], read)
         return None if known is None else Found(folder, self._stale(root, folder), *known)

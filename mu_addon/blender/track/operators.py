@@ -8,10 +8,8 @@ import bpy
 from bpy.props import StringProperty
 
 from ...errors import InputError
-from ...run.context import RunContext
-from ...run.execution import Execution
-from ...run.progress import Progress
 from ...studies.track import Track
+from ..jobs.here import run_here
 from ..shared.operators import reports_errors
 from ..unit import object as unit_object
 from . import properties as bench
@@ -90,13 +88,9 @@ class MU_OT_track_write(bpy.types.Operator):
             pressure=Path(bpy.path.abspath(clip.mu_bench.pressure)),
             followed=tracking.tracks_of(clip),
         )
-        messages = []
-        folder = Path(bpy.path.abspath(clip.mu_bench.folder))
-        work = Execution(study, folder, RunContext(Progress([messages.append])))
-        work.run()
-        for message in messages:
-            if message["type"] == "warning":
-                self.report({"WARNING"}, message["what"])
+        work, warnings = run_here(study, Path(bpy.path.abspath(clip.mu_bench.folder)))
+        for warning in warnings:
+            self.report({"WARNING"}, warning["what"])
         self.report({"INFO"}, ". ".join(work.lines))
         root = unit_object.active_root(context)
         if root is not None and not root.mu_evidence.folder:

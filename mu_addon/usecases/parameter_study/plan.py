@@ -234,8 +234,8 @@ def _plan_of(document: TomlTable, folder: Path) -> Plan:
         keys["simulate"] = {"self_contact": SELF_CONTACT.default} | dict(document.inner("simulate").values)
     given = [name for name in ("preset", "unit") if keys.get(name)]
     if len(given) != 1:
-        what = 'write preset = "mu-1.0x" or unit = "my-unit.toml"'
-        raise InputError("no unit is given", document.at(), what)
+        remedy = 'write preset = "mu-1.0x" or unit = "my-unit.toml"'
+        raise InputError("no unit is given", document.at(), remedy)
 
     def unit(file: _File) -> Unit:
         return load_preset(file.preset) if file.preset else read_unit(folder / file.unit)

@@ -17,6 +17,7 @@ from ...fem.equilibrium import LOWER
 from ...fem.kinematics import probe
 from ...fem.state import State
 from ...fem.trajectory import Trajectory
+from ...generators import value_of
 from ...meshing.mesh import Mesh
 from ...placement.candidates import Candidate, Evaluation, evaluation
 from ...placement.deviation import centreline
@@ -136,7 +137,7 @@ def followed(waveguides: PrintedWaveguides, number: int, pressures_kPa: Sequence
 class Comparison:
     """What candidates are compared at: distinct pressures in kPa, number of instants of each, weight or not.
 
-    names: of the candidates; work: of a state at each pressure, in units of one under pressure.
+    names: of the candidates.
     """
 
     names: tuple[str, ...]
@@ -432,15 +433,15 @@ def deviation_alone(
 ) -> tuple[float, Solved | None]:
     """J_hat in mm of one candidate, by its number, nan where it reaches no pressure; and all its states."""
     states = {round(s.pressure_kPa, 9): s for s in motion.solved}
-    growth, parts = solving(compared, None), list[Solved]()
-    asked = next(growth)
+    parts: list[Solved] = []
+
+    def solve(asked: Sequence[Member]) -> list[Solved]:
+        ((_, pressures),) = asked
+        parts.append(solved(waveguides, number, pressures, states, stations))
+        return parts[-1:]
+
     try:
-        while True:
-            ((_, pressures),) = asked
-            parts.append(solved(waveguides, number, pressures, states, stations))
-            asked = growth.send(parts[-1:])
-    except StopIteration as end:
-        known = end.value
+        known = value_of(solving(compared, None), solve)
     except ConvergenceError:
         return np.nan, None
     found = evaluated(compared, known, PathCheck(), motion, waveguides.anchors, stations)

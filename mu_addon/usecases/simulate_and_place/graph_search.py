@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import itertools
-from collections.abc import Generator, Sequence
+from collections.abc import Sequence
 from typing import Any
 
 import attrs
@@ -18,7 +18,7 @@ from ...errors import ConvergenceError, InputError
 from ...fem.kinematics import probe
 from ...fem.trajectory import Trajectory, whole_body
 from ...placement.graph import Graph, Limits, lattice_graph
-from ...placement.search import Search, SearchSettings, front, searching
+from ...placement.search import Search, front
 from ...placement.sensitivity_map import (
     deviation_map,
     gradients_of,
@@ -153,19 +153,6 @@ def is_printable(unit: Unit, points: Array) -> bool:
     except InputError:
         return False
     return True
-
-
-def checking(predicted_mm: Array, most: int) -> Generator[list[int], Sequence[float], Search]:
-    """Yield numbers of chains to solve, get their J_hat in mm (nan: impossible), and return the search."""
-    search = searching(predicted_mm, SearchSettings(most=most))
-    asked = next(search)
-    while True:
-        J = yield asked.tolist()
-        try:
-            asked = search.send(np.array(J, float))
-        except StopIteration as end:
-            outcome: Search = end.value
-            return outcome
 
 
 def lattice_paths(unit: Unit, limits: Limits, predicted_mm: Array, outcome: Search) -> list[LatticePath]:

@@ -96,7 +96,7 @@ def tables_of(mechanics: Mechanics, motion: Trajectory, cache: Path) -> MotionTa
     model = mechanics.model(motion.mesh)
     # With self-contact no step passes a touch.
     crossed = {} if mechanics.self_contact else crossings(motion.mesh, motion.solved)
-    stretch = stretch_rows(mechanics, motion.mesh, motion.solved, cache)
+    stretch = stretch_rows(mechanics, model, motion.solved, cache)
     return MotionTables(stretch, crossed, model.solver, len(model.free))
 
 

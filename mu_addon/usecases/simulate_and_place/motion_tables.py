@@ -15,9 +15,11 @@ from ...fem.bending_angle import TipSection
 from ...fem.kinematics import cavity_volume_mm3
 from ...fem.state import State
 from ...fem.stress import peak_stretch
+from ...fem.unit_materials import self_contact_of as contact_of
 from ...meshing.mesh import LATTICE, MEMBRANE, Mesh
 
 if TYPE_CHECKING:
+    from ...fem.model import Model
     from .mechanics import Mechanics, Samples
 
 Array = np.ndarray[Any, Any]
@@ -76,7 +78,7 @@ def angles_of(rows: Sequence[Sequence[float]]) -> dict[str, float]:
 
 
 def stretch_rows(
-    mechanics: Mechanics, mesh: Mesh, states: Sequence[State], cache: Path | None = None
+    mechanics: Mechanics, model: Model, states: Sequence[State], cache: Path | None = None
 ) -> tuple[Row, ...]:
     """The largest stretches of wall, struts and joints in every state, and where: rows of stretch.csv.
 
@@ -84,12 +86,12 @@ def stretch_rows(
     """
     elongation = mechanics.unit.material.elongation_at_break
     d = covering(mechanics.unit.printed, mechanics.body)
-    materials, model = mechanics.materials(mesh), mechanics.model(mesh) if len(mesh.beams) else None
+    mesh, materials = model.mesh, mechanics.materials(model.mesh)
     rows: list[Row] = []
     for state in states:
         found = {"wall": peak_stretch(mesh, state.u, MEMBRANE)}
         found["struts"] = peak_stretch(mesh, state.u, LATTICE)
-        joints = None if model is None else joint_stretch(model, materials, d, state.u, cache)
+        joints = joint_stretch(model, materials, d, state.u, cache) if len(mesh.beams) else None
         if joints is not None:
             found["joints"] = joints
         for part, peak in found.items():
@@ -112,8 +114,7 @@ def self_contact_of(mechanics: Mechanics, mesh: Mesh, states: Sequence[State]) -
     """Self-contact of every state; none where it is not simulated."""
     if not mechanics.self_contact:
         return SelfContact()
-    contact = mechanics.model(mesh).self_contact
-    assert contact is not None
+    contact = contact_of(mechanics.unit, mesh, mechanics.self_friction)
     found = [contact.touch(state.u) for state in states]
     rows: list[Row] = []
     for state, touch in zip(states, found, strict=True):

@@ -17,10 +17,12 @@ from ...errors import ConvergenceError, InputError
 from ...fem.factor import IndefiniteError
 from ...fem.state import State
 from ...fem.trajectory import Trajectory, whole_body
+from ...generators import value_of
 from ...meshing.mesh import Mesh
 from ...placement.candidates import Candidate
 from ...placement.elimination import Contest
 from ...placement.graph import Limits
+from ...placement.search import Search, SearchSettings, searching
 from ...report.results import LatticePath, Signals
 from ...run.cache import Cache
 from .candidates import (
@@ -35,7 +37,7 @@ from .candidates import (
     solving,
     waveguides_of,
 )
-from .graph_search import Predicted, chains_within, checking, is_printable, lattice_paths
+from .graph_search import Predicted, chains_within, is_printable, lattice_paths
 from .light import light_signals
 from .mechanics import Mechanics, Samples
 from .model_a import InTime
@@ -49,7 +51,6 @@ if TYPE_CHECKING:
     from ...sensing.optics import Optics
 
 Array = np.ndarray[Any, Any]
-Growing = Generator[list[Any], Sequence[Any], Any]
 
 
 def require_paths(unit: Unit, body: Body | None, limits: Limits | None) -> None:
@@ -244,21 +245,14 @@ class CheckedPath:
     difference_mm: Array = attrs.field(factory=lambda: np.empty((0, 0, 3), np.float32))
 
 
+def checked_paths(found: Predicted, most: int) -> Generator[list[int], Sequence[CheckedPath], Search]:
+    """Yield numbers of paths to solve, get them, and return the search's outcome."""
+    return searching(found.J_mm, SearchSettings(most=most), lambda one: one.J_mm)
+
+
 def whole_motion(motion: Trajectory) -> Trajectory:
     """Motion of the whole body, of that of its half."""
     return whole_body(motion.mesh, motion)[1]
-
-
-def checked_paths(found: Predicted, most: int) -> Growing:
-    """Yield numbers of paths to solve, get them, and return the search's outcome."""
-    search = checking(found.J_mm, most)
-    asked = next(search)
-    while True:
-        solved = yield asked
-        try:
-            asked = search.send([one.J_mm for one in solved])
-        except StopIteration as end:
-            return end.value
 
 
 def check_path(
@@ -308,14 +302,7 @@ def search_of(
     unit: Unit, limits: Limits, found: Predicted, checks: int, checked: Mapping[int, CheckedPath]
 ) -> SearchOutcome:
     """The search's outcome from the paths that were solved."""
-    growth = checked_paths(found, checks)
-    asked = next(growth)
-    while True:
-        try:
-            asked = growth.send([checked[number] for number in asked])
-        except StopIteration as end:
-            outcome = end.value
-            break
+    outcome = value_of(checked_paths(found, checks), lambda asked: [checked[number] for number in asked])
     paths = lattice_paths(unit, limits, found.J_mm, outcome)
     return SearchOutcome(
         tuple(paths),

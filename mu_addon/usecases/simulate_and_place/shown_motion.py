@@ -195,7 +195,7 @@ def _stretch(tables: MotionTables, most: Mapping[str, Any], elongation: float, p
 
 
 def _signed(row: tuple[str, ...], text: int = -1) -> list[str]:
-    """Cells with true minus signs; text: number of the column that is none."""
+    """Cells with true minus signs; text: number of a column of words, which keep their hyphens."""
     return [cell if n == text else plots.signed(cell) for n, cell in enumerate(row)]
 
 
@@ -266,7 +266,6 @@ def _painted(
         return found
 
     def make() -> list[tuple[str, Picture]]:
-        from ...report.heatmaps import field_colors
         from ...report.unit_pictures import motion as pictures
 
         one, outside = look(), field == CONTACT_PRESSURE
@@ -279,7 +278,9 @@ def _painted(
             # Struts would hide the creases where walls meet.
             for name in ("membrane",) if outside else REGIONS:
                 painted = np.ones((len(motion.mesh.nodes), 3))
-                painted[fields.surfaces[name].node] = field_colors(one["every"][name][k], low, one["top"])
+                painted[fields.surfaces[name].node] = heatmaps.field_colors(
+                    one["every"][name][k], low, one["top"]
+                )
                 by_region[REGIONS[name]] = painted
             colors.append(by_region)
         if not texts:
@@ -391,12 +392,9 @@ def _rows(study: Any) -> list[tuple[str, Any, str, str, bool]]:
     if effects.has_gravity:
         source = "given by the user; 0: hanging, tip down"
         rows.append(("orientation", effects.orientation_deg, "deg", source, False))
-    stations = getattr(study, "stations", None)
     rows.append(("study.times", study.times, "", "samples of the protocol; the paper gives none", True))
-    if stations is not None:
-        rows.append(
-            ("study.stations", stations, "", "stations along the backbone; the paper gives none", True)
-        )
+    source = "stations along the backbone; the paper gives none"
+    rows.append(("study.stations", study.stations, "", source, True))
     rows.append(("mesh.refine", study.mesh.refine, "", "divides every element size", False))
     source = "between the paper's pressures; it gives no times"
     rows.append(("protocol", "protocol.csv", "", source, True))

@@ -30,6 +30,7 @@ from ...run.parts import (
     Table,
     Warn,
     csv,
+    echo,
     listed,
     recorded,
 )
@@ -99,12 +100,10 @@ def answer_parts(
             )
         yield from _key_figures(ranking, motion)
         equal = f", tied with {', '.join(ranking.tied)}" if ranking.tied else ""
-        line = f"best path: {best.name}, J_hat {J[best.name]:.4f} mm{equal}{without}"
-        yield Sentence(line, terminal=True, page=False)
+        yield from echo(f"best path: {best.name}, J_hat {J[best.name]:.4f} mm{equal}{without}")
         if ranking.at_least_mm:
             bounds = ", ".join(f"{name} {bound:.3f}" for name, bound in ranking.at_least_mm.items())
-            line = f"not solved further, J_hat at least [mm]: {bounds}; --all-paths solves them"
-            yield Sentence(line, terminal=True, page=False)
+            yield from echo(f"not solved further, J_hat at least [mm]: {bounds}; --all-paths solves them")
     chosen = ranking.chosen if ranking else ""
     yield Beside([_section(study, solid, ranking), Pictures(partial(_portrait, study, solid, chosen))])
 
@@ -181,7 +180,7 @@ def _portrait(study: Any, solid: Solid, chosen: str) -> list[tuple[str, Picture]
 def ranking_parts(study: Any, ranking: Ranking, motion: Trajectory) -> Iterator[Part]:
     """Every path's deviation, in files, charts and a table."""
     paths, result = paths_of(study), result_of(ranking)
-    yield csv("deviation.csv", COLUMNS, ranking.rows(study.candidates_paths))
+    yield csv("deviation.csv", COLUMNS, ranking.rows(study.candidate_paths))
     arrays = {
         "delta_mm": result.delta,
         "path": np.array([*ranking.evaluations]),
@@ -297,11 +296,9 @@ def search_parts(study: Any, solid: Solid, found: SearchOutcome, predicted: Pred
             },
         },
     )
-    yield Sentence(
+    yield from echo(
         f"whole-lattice search: {best.name}, J_hat {best.j_hat:.4f} mm, {best.length_mm:.1f} mm long; "
-        f"{found.checked} of {found.count} paths solved by the full model",
-        terminal=True,
-        page=False,
+        f"{found.checked} of {found.count} paths solved by the full model"
     )
     if words := unstable_at(predicted.unstable_kPa, "The ranking of paths leaves"):
         yield Warn(words)
@@ -319,10 +316,9 @@ def search_parts(study: Any, solid: Solid, found: SearchOutcome, predicted: Pred
     yield Sentence(
         f"Of {found.count} paths through nodes of the lattice, bent paths included, {best.name} has the "
         f"smallest deviation: {best.j_hat:.3f} mm. All were ranked by a reduced model; the {len(solved)} "
-        "below "
-        f"were solved by the full model. The probability that another path is better is {certain}, if the "
-        "reduced model is as accurate for the others as for these. Paths marked “best for their length” are "
-        "Pareto-optimal in deviation and length.",
+        "below were solved by the full model. The probability that another path is better is "
+        f"{certain}, if the reduced model is as accurate for the others as for these. Paths marked “best for "
+        "their length” are Pareto-optimal in deviation and length.",
         strong=best.name,
     )
     yield Pictures(partial(_search_picture, study, solid, best))
