@@ -2,6 +2,7 @@
 
     python -m benchmarks.commands                       # all of them
     python -m benchmarks.commands homogenize grip       # some
+    python -m benchmarks.commands --plans               # motions and rankings of ten kinds
     python -m benchmarks.commands --logs FOLDER sweep   # keeps each line that a command wrote, with its time
 
 A command whose full run takes over two minutes runs coarse, as its row shows. "Told" is the time that the
@@ -28,6 +29,7 @@ from typing import NamedTuple
 
 from benchmarks.interrupts import CHAIN, CHAIN_PROTOCOL, DESIGN, SWEEP
 from benchmarks.table import ROOT, circumstances, options_of
+from mu_addon.design.parameters import load_preset, to_toml
 
 LEAST_S = 10.0
 QUICK = "--refine 0.4 --times 3"
@@ -56,6 +58,18 @@ ROWS = (
     "record --simulate --seconds 5",
     "replay RECORDING",
     "calibrate SWEEPS --channel light_V --dark dark_V --angles assets/examples/bench/angles.csv",
+)
+PLANS = (
+    "place --preset mu-1.0x --quick",
+    "place --preset mu-1.0x --refine 0.5",
+    "place --unit four.toml --refine 0.35",
+    "place --unit five.toml --refine 0.5 --no-self-contact",
+    "place --preset mu-1.5x --refine 0.35 --no-mesh-check",
+    "simulate --preset mu-1.0x",
+    "simulate --preset mu-0.75x --refine 0.5",
+    "simulate --unit three.toml --refine 0.5 --no-self-contact",
+    "simulate --unit four.toml --under-pressure",
+    "simulate --unit five.toml --refine 0.35 --times 25",
 )
 _UNITS = {"s": 1.0, "min": 60.0, "h": 3600.0}
 _SHARE = re.compile(r"^ *(\d+) %  ")
@@ -141,6 +155,8 @@ def prepare(work: Path) -> None:
     )
     (work / "chain.toml").write_text(CHAIN)
     (work / "chain.csv").write_text(CHAIN_PROTOCOL)
+    for name, count in (("three", 3), ("four", 4), ("five", 5)):
+        (work / f"{name}.toml").write_text(to_toml(load_preset("mu-1.0x").evolve(count=count)))
     rows = "".join(f"{0.1 * n:.1f},{0.05 * n:.3f},{0.02 * n:.3f}\n" for n in range(200))
     (work / "tension.csv").write_text("Time (s),Force (N),Displacement (mm)\n" + rows)
 
@@ -149,6 +165,7 @@ def main() -> None:
     """Run the commands and print their table."""
     parser = options_of(__doc__)
     parser.add_argument("commands", nargs="*", help="names of commands (default: all)")
+    parser.add_argument("--plans", action="store_true", help="motions and rankings whose plans are compared")
     parser.add_argument("--logs", type=Path, help="folder for the words of each command")
     given = parser.parse_args()
     print(circumstances(), "\n")
@@ -160,7 +177,7 @@ def main() -> None:
         work = Path(folder)
         prepare(work)
         last = {"FOLDER": "", "RECORDING": "", "SWEEPS": ""}
-        for number, row in enumerate(ROWS):
+        for number, row in enumerate(PLANS if given.plans else ROWS):
             name = row.split()[0]
             words = [last.get(word, word) for word in shlex.split(row)]
             if given.commands and name not in given.commands:

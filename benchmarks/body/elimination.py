@@ -1,12 +1,12 @@
-"""What a ranking saves by leaving paths that cannot win, and that the best ones' digits do not change.
+"""What a ranking says before it is done, and what it saves by leaving paths that cannot win.
 
-    python -m benchmarks.body.elimination [--preset mu-1.0x] [--chambers N] [--refine 0.35] [--protocol CSV]
-                                          [--times K] [--mesh-check] [--workers 2]
+    python -m benchmarks.body.elimination [mu-1.0x UNIT.toml ...] [--refine 0.35] [--workers 2]
 
-`place` runs in a new folder, then with --all-paths in it: the second run solves only what the first left out,
-so that both together are the cost of solving all, on the same work. Seconds are of the processor, of all
-processes, and by the clock. Columns of a path: J_hat in mm estimated before any path is solved, its lower
-bound where it was left out, and its exact value.
+Of each unit `place` runs in one folder with --quick, then in full, then with --all-paths: the last run solves
+only what the second left out, so that all together cost as much as solving all at once. Seconds are of the
+processor, of all processes, and by the clock. Columns of a path: J_hat in mm of the quick ranking, estimated
+before any path is solved, its lower bound where the full ranking left it out, its exact value, and whether
+the full ranking had the same digits. The mesh check is on; `tied` says which paths it does not tell apart.
 """
 
 from __future__ import annotations
@@ -20,62 +20,70 @@ import tempfile
 import time
 from pathlib import Path
 
-from benchmarks.table import options_of, print_head, print_row
-from mu_addon.design.parameters import load_preset, to_toml
+from benchmarks.table import circumstances, options_of, print_head, print_row
 
 RUN = Path(__file__).parents[2] / "headless" / "run.py"
-SOLVED = "J_hat_mm", "J_cont_mm", "rank", "mesh_uncertainty_mm"
+PRESETS = ["mu-0.75x", "mu-1.0x", "mu-1.5x"]
+SOLVED = "J_hat_mm", "J_cont_mm"
+Rows = dict[str, dict[str, str]]
 
 
 def main() -> None:
     parser = options_of(__doc__)
-    parser.add_argument("--preset", default="mu-1.0x")
-    parser.add_argument("--chambers", type=int)
+    parser.add_argument("units", nargs="*", default=PRESETS)
     parser.add_argument("--refine", default="0.35")
-    parser.add_argument("--protocol")
-    parser.add_argument("--times", default="13")
-    parser.add_argument("--mesh-check", action="store_true")
     parser.add_argument("--workers", default="2")
     options = parser.parse_args()
-    unit = load_preset(options.preset)
-    with tempfile.TemporaryDirectory() as home:
-        given = Path(home, "unit.toml")
-        given.write_text(to_toml(unit.evolve(count=options.chambers or unit.chambers.count)))
-        words = ["place", "--unit", str(given), "--out", str(Path(home, "out")), "--no-report", "--quiet"]
-        words += ["--refine", options.refine, "--times", options.times, "--workers", options.workers]
-        words += ["--protocol", options.protocol] if options.protocol else []
-        words += [] if options.mesh_check else ["--no-mesh-check"]
-        some, some_s = placed(words, Path(home, "out"))
-        every, rest_s = placed([*words, "--all-paths"], Path(home, "out"))
-        summary = json.loads(Path(home, "out", "summary.json").read_text())
-    print_head("path", "estimated mm", "at least mm", "exact mm", "same digits")
+    print(circumstances(), "\n")
+    heads = "unit", "path", "quick mm", "estimated mm", "at least mm", "exact mm", "same digits", "tied"
+    print_head(*heads)
+    seconds = {}
+    for unit in options.units:
+        with tempfile.TemporaryDirectory() as home:
+            given = ["--unit", unit] if unit.endswith(".toml") else ["--preset", unit]
+            words = ["place", *given, "--out", str(Path(home, "out")), "--no-report", "--quiet"]
+            words += ["--refine", options.refine, "--workers", options.workers]
+            runs = [placed([*words, *more], Path(home, "out")) for more in (["--quick"], [], ["--all-paths"])]
+        name = Path(unit).stem
+        print_paths(name, *(rows for rows, *_ in runs), runs[1][1])
+        seconds[name] = [spent for *_, spent in runs]
+    print()
+    spans = "quick ranking", "rest of the ranking", "paths that cannot win"
+    print_head("unit", *(f"{span}, {kind} s" for span in spans for kind in ("processor", "clock")))
+    for name, spent in seconds.items():
+        print_row(name, *(f"{s:.0f}" for pair in spent for s in pair))
+
+
+def print_paths(unit: str, quick: Rows, some: Rows, every: Rows, summary: dict) -> None:
+    """A row for each path of a unit."""
     estimated = summary.get("J_hat_estimated_mm", {})
     for name, row in every.items():
-        first, guess = some[name], estimated.get(name)
-        same = all(first[c] == row[c] for c in SOLVED[:2]) if first["J_hat_mm"] else ""
-        bound = first["J_hat_at_least_mm"]
-        exact = f"{float(row['J_hat_mm']):.4f}" if row["J_hat_mm"] else "none"
+        same = "" if not some[name]["J_hat_mm"] else all(some[name][c] == row[c] for c in SOLVED)
         print_row(
+            unit,
             name,
-            "" if guess is None else f"{guess:.3f}",
-            f"{float(bound):.4f}" if bound else "",
-            exact,
-            "" if same == "" else "yes" if same else "NO",
+            short(quick[name]["J_hat_mm"]) or f"at least {short(quick[name]['J_hat_at_least_mm'])}",
+            short(estimated.get(name, "")),
+            short(some[name]["J_hat_at_least_mm"]),
+            short(row["J_hat_mm"]) or "none",
+            {"": "", True: "yes", False: "NO"}[same],
+            some[name]["tied_with_chosen"],
         )
-    print()
-    print_head("", "processor s", "clock s")
-    print_row("paths that can win", *(f"{s:.0f}" for s in some_s))
-    print_row("the others", *(f"{s:.0f}" for s in rest_s))
-    print_row("share of all", *(f"{a / (a + b):.2f}" for a, b in zip(some_s, rest_s, strict=True)))
 
 
-def placed(words: list[str], out: Path) -> tuple[dict[str, dict[str, str]], tuple[float, float]]:
-    """Rows of deviation.csv by path, and the seconds of the processor and by the clock, of a command."""
+def short(number: str | float) -> str:
+    """A length in mm to a tenth of a micrometre, or nothing."""
+    return "" if number == "" else f"{float(number):.4f}"
+
+
+def placed(words: list[str], out: Path) -> tuple[Rows, dict, tuple[float, float]]:
+    """Rows of deviation.csv by path, summary, and the command's seconds of the processor and by the clock."""
     begun, used = time.perf_counter(), _used_s()
     subprocess.run([sys.executable, str(RUN), *words], check=True)
     seconds = _used_s() - used, time.perf_counter() - begun
     with (out / "deviation.csv").open(newline="", encoding="utf-8") as stream:
-        return {row["path"]: row for row in csv.DictReader(stream)}, seconds
+        rows = {row["path"]: row for row in csv.DictReader(stream)}
+    return rows, json.loads((out / "summary.json").read_text()), seconds
 
 
 def _used_s() -> float:

@@ -55,7 +55,7 @@ class Execution:
         # Digest of what each file holds: one that is shown again is not written again.
         self._written: dict[str, str] = {}
         self._shown_s = 0.0
-        self._growth: dict[str, tuple[Growth, Sequence[Any]]] = {}
+        self._growth: dict[str, tuple[Growth, Sequence[Any] | str]] = {}
         of = {name: self._stages[name].over for name in self.results.members}
         self.results.growing = {name for name, over in of.items() if over and over.grows}
         self._waiting: list[Task] = []
@@ -156,15 +156,23 @@ class Execution:
             worth = self._worth(waiting, first=one_here)
             here = next((t for t in worth if one_here or not self._is_for_pool(t)), None)
             if here is not None:
+                self._wait_for([here])
                 update(self._finish(here))
             elif worth and self.study.elsewhere:
                 self._make_elsewhere(worth, update)
             elif self._fill(pool, worth) or self._running:
+                self._wait_for(own(self._running.values()))
                 for future in wait(self._running, return_when=FIRST_COMPLETED).done:
                     update(self._finish(self._running.pop(future), partial(pool.result, future)))
             else:
                 self._give_up(waiting)
                 update()
+
+    def _wait_for(self, tasks: Iterable[Task]) -> None:
+        """Tell the progress what has been made for longest."""
+        every = ((self._stages[name].doing, member) for name, member in tasks)
+        words = (doing(self.study, member) for doing, member in every if doing)
+        self.context.progress.waits_for = next(words, "")
 
     def _is_parallel(self, tasks: Sequence[Task]) -> bool:
         return any(self._stages[name].parallel for name, _ in tasks)
@@ -271,8 +279,8 @@ class Execution:
         self._done.add(task)
         if task in self._waiting:
             self._waiting.remove(task)
-        if task[0] in self._growth:
-            self._grow(task[0])
+        for name in [*self._growth]:
+            self._grow(name)
         self._begin_growth()
         return message
 
@@ -305,12 +313,13 @@ class Execution:
         new: list[Any] = []
         while name in self._growth:
             growth, asked = self._growth[name]
-            new += [m for m in asked if m not in self.results.members[name] and m not in new]
-            if not all((name, member) in self._done for member in asked):
+            awaits = isinstance(asked, str)
+            tasks = self._tasks_of(asked) if isinstance(asked, str) else [(name, m) for m in asked]
+            new += [m for of, m in tasks if of == name and m not in self.results.members[name] + new]
+            if not all(self._is_made(task) for task in tasks):
                 break
             try:
-                results = [self.results.value((name, member)) for member in asked]
-                self._growth[name] = growth, growth.send(results)
+                self._growth[name] = growth, self._asked_next(growth, tasks, awaits)
             except (StopIteration, Dropped):
                 del self._growth[name]
                 self.results.growing.discard(name)
@@ -320,6 +329,14 @@ class Execution:
             self._waiting += [(name, member) for member in new]
         if name not in self.results.growing:
             self._begin_growth()
+
+    def _asked_next(self, growth: Growth, tasks: Sequence[Task], awaits: bool) -> Sequence[Any] | str:
+        """What a growth asks for after the results of some tasks, or after Dropped of one without."""
+        try:
+            results = [self.results.value(task) for task in tasks]
+        except Dropped as dropped:
+            return growth.throw(dropped)
+        return growth.send(results[0] if awaits else results)
 
     def _forget(self) -> None:
         """Release results that no task to come takes: a factor, a field of displacements."""

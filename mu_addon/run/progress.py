@@ -5,9 +5,10 @@ A `Progress` makes messages, plain dictionaries with a `type`, and hands each to
 - plan: the stages that are expected, as [name, seconds], the seconds of all, and how many times slower other
   work of the machine makes them
 - progress: stage, state ("start" | "run" | "end"), fraction (0..1 or None), seconds, seconds_left (or None).
-  Optional: detail, the last step done or, at the end, the stage's result; beat, only the time is new. With a
-  plan: whole (0..1) and whole_seconds_left of the run, and why, the reason if the time left grew. Of a run
-  within this one the stage begins with its name, and part (0..1) and part_seconds_left are its own.
+  Optional: detail, the last step done or, at the end, the stage's result; waits_for, what is being done;
+  beat, only the time is new. With a plan: whole (0..1) and whole_seconds_left of the run, and why, the
+  reason if the time left grew. Of a run within this one the stage begins with its name, and part (0..1) and
+  part_seconds_left are its own.
 - finding: what, a first finding while the run goes on
 - warning: what, where, what_to_do
 - result: whatever the run found; the last message of a run that succeeded
@@ -47,7 +48,7 @@ SLOWED = 1.25
 class Progress:
     """Stages of one run, reported to `sinks`; `seconds` keeps each stage's duration, in order.
 
-    estimate: of the whole run, if there is a `plan`.
+    estimate: of the whole run, if there is a `plan`; waits_for: what is being done, in a few words, or "".
     """
 
     def __init__(self, sinks: Sequence[Sink] = (), clock: Clock = time.perf_counter) -> None:
@@ -61,7 +62,7 @@ class Progress:
         self._fraction: float | None = None
         self._pace = Pace()
         self._emitted_s = clock()
-        self._made = ""
+        self._made = self.waits_for = ""
         self._one_at_a_time = threading.RLock()
         self.estimate = ProgressEstimate((), clock)
 
@@ -119,7 +120,7 @@ class Progress:
             with self._one_at_a_time:
                 elapsed = self._clock() - self._start
                 self.seconds[name] = self.seconds.get(name, 0.0) + elapsed
-                self._stage = self._made = ""
+                self._stage = self._made = self.waits_for = ""
 
     def made(self, size: str) -> None:
         """Set the size of the present stage's result, such as "6210 nodes", reported at its end."""
@@ -199,6 +200,7 @@ class Progress:
                 "seconds": elapsed,
                 "seconds_left": 0.0 if state == "end" else left,
                 **({"detail": detail} if detail else {}),
+                **({"waits_for": self.waits_for} if self.waits_for and state == "run" else {}),
                 **({"beat": True} if beat else {}),
             }
             self._emit_estimated(message)

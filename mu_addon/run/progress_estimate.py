@@ -85,6 +85,7 @@ class ProgressEstimate:
         self._taken: dict[str, float] = {}
         self._stage = ""
         self._share = self._kept = 0.0
+        self._waits_for = ""
         self._by_itself = False
         self._spent = 0.0
         self._own_left: float | None = None
@@ -112,6 +113,7 @@ class ProgressEstimate:
     def tell(self, message: Mapping[str, Any]) -> None:
         """Process a progress message, see `progress`."""
         stage, share = str(message.get("stage", "")), message.get("fraction")
+        self._waits_for = str(message.get("waits_for", ""))
         whole = next((name for name in self._expected if stage.startswith(f"{name}: ")), "")
         if stage not in self._expected and whole:
             self._tell_part(whole, message)
@@ -220,7 +222,8 @@ class ProgressEstimate:
             if left <= LONGER * shown + SLACK_S:
                 self._forget_reason(shown)
                 return
-            self.why = f"{added} was added" if added else f"{self._stage} takes longer than expected"
+            longer = f"{self._waits_for or self._stage} takes longer than expected"
+            self.why = f"{added} was added" if added else longer
             self._grown_from, self._grown_at = shown, self._clock()
         else:
             self._forget_reason(left)

@@ -193,7 +193,8 @@ def given(one: Input, **more: Any) -> Any:
     return attrs.field(metadata={_INPUT: one}, kw_only=True, **more)
 
 
-Growth = Generator[Sequence[Any], Sequence[Any], Any]
+Growth = Generator[Sequence[Any] | str, Any, Any]
+"""Yields members of a set, and is sent their results; or a stage's name, and is sent that stage's result."""
 
 
 def grown(growth: Growth, results: Mapping[Any, Any]) -> Any:
@@ -210,10 +211,12 @@ class Over:
     result depends on them. needs: of a member, by parameter, the one member or the list of members of a
     stage's set that it takes; a parameter that is not there takes the whole set. A stage that names itself
     takes earlier members. grows: of a study, a generator that yields members, new ones among them, and is
-    sent their results once all are made; one without a result ends it. Its value is that of `grown`. most:
-    the expected number of members of a set that grows; after: names of stages whose results `grows` takes
-    after the study, once they are made. choose: of the members that could be made now, those
-    that are worth it, the first one first, from the results so far; what is never chosen has no result.
+    sent their results once all are made; Dropped is raised in it, and ends it, if one has none. It may yield
+    the name of a stage before its own: to begin with likely members, and add those that its result asks for.
+    Its value is that of `grown`. most: the expected number of members of a set that grows; after: names of
+    stages whose results `grows` takes after the study, once they are made. choose: of the members that could
+    be made now, those that are worth it, the first one first, from the results so far; what is never chosen
+    has no result.
     """
 
     names: tuple[str, ...]
@@ -242,6 +245,7 @@ class Stage:
     parallel: bool
     again: Callable[[Any, Any], bool] | None
     says: Callable[[Any], str] | None
+    doing: Callable[[Any, Any], str] | None
 
     @property
     def needs(self) -> tuple[str, ...]:
@@ -288,6 +292,7 @@ def stage(
     parallel: bool = False,
     again: Callable[[Any, Any], bool] | None = None,
     says: Callable[[Any], str] | None = None,
+    doing: Callable[[Any, Any], str] | None = None,
 ) -> Callable[[Any], Any]:
     """A method that makes one result, or one for each member of a set; its `self` is None.
 
@@ -299,7 +304,8 @@ def stage(
     needs it is left out. revision: raise it when a change of the code changes the result. parallel:
     members may be made in processes of their own, the study's `workers`, side by side with all other parallel
     stages, the first ones first, or by the workers of its `scheduler`. again: True of a study and a result
-    that an earlier run kept and this one makes anew. says: a few words on a result, for its progress.
+    that an earlier run kept and this one makes anew. says: a few words on a result, for its progress. doing:
+    words, of a study and a member, on what is made, for a progress that waits for it.
     """
 
     if parallel and not kept:
@@ -326,6 +332,7 @@ def stage(
                 parallel,
                 again,
                 says,
+                doing,
             ),
         )
         return method

@@ -61,6 +61,12 @@ def before(study: UnitMotion, pressure_kPa: float) -> list[float]:
     return [*([0.0] if study.effects.has_gravity and pressure_kPa else []), *way][-3:]
 
 
+def state_sought(study: UnitMotion, pressure_kPa: float) -> str:
+    """A few words on a state that is being solved."""
+    what = "self-contact" if study.self_contact and pressure_kPa < 0 else "equilibrium"
+    return f"{what} at {pressure_kPa:.4g} kPa"
+
+
 def state_message(state: fem.State) -> str:
     """A few words on a state."""
     return f"{state.pressure_kPa:.4g} kPa, residual {state.residual:.1e}, {state.iterations} iterations"
@@ -333,6 +339,7 @@ class UnitMotion(Study):
         wanted=_simulates_by_pressure,
         parallel=True,
         says=state_message,
+        doing=state_sought,
     )
     def states(self, pressure_kPa: float, states: Members, equilibrium: fem.Equilibrium) -> fem.State:
         """The state at a pressure, from those before it on the same side of rest."""

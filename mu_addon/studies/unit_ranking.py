@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
+from contextlib import suppress
 from functools import cached_property
 from typing import Any
 
@@ -37,7 +38,7 @@ from ..usecases.simulate_and_place.settings import (
 )
 from .inputs import OnceInput
 from .unit_inputs import OpticsInput
-from .unit_motion import SOLVER, UnitMotion, state_message, taking
+from .unit_motion import SOLVER, UnitMotion, state_message, state_sought, taking
 
 LATTICE = "paths, and limits of --paths graph"
 COARSER = 0.7
@@ -90,13 +91,29 @@ def _at_pressures(study: UnitStudy, member: core.Member) -> Mapping[str, Any]:
     return {**_number(study, member[0]), "pressures_kPa": member[1]}
 
 
-def _extremes(study: UnitStudy, first_ranking: core.Ranking) -> Growth:
-    yield core.extremes(study.samples.pressure_kPa[first_ranking.compared]).tolist()
+def _sought(study: UnitStudy, member: core.Member) -> str:
+    return f"{member[0]} at {', '.join(f'{p:g}' for p in member[1])} kPa"
 
 
-def _best_on_coarse(study: UnitStudy, first_ranking: core.Ranking) -> Growth:
-    chosen = core.extremes(study.samples.pressure_kPa[first_ranking.compared]).tolist()
-    yield [(name, tuple(chosen)) for name in first_ranking.best(PATHS_CHECKED)]
+def _extremes(study: UnitStudy, ranking: core.Ranking) -> list[float]:
+    found: list[float] = core.extremes(study.samples.pressure_kPa[ranking.compared]).tolist()
+    return found
+
+
+def _extremes_on_coarse(study: UnitStudy, motion: fem.Trajectory) -> Growth:
+    # Model A reaches all pressures: candidates are likely to, and are not waited for.
+    with suppress(Dropped):
+        yield core.extremes(motion.pressure_kPa).tolist()
+    yield _extremes(study, (yield "first_ranking"))
+
+
+def _best_on_coarse(study: UnitStudy, likely_ranking: core.Ranking) -> Growth:
+    def members(ranking: core.Ranking) -> list[core.Member]:
+        return [(name, tuple(_extremes(study, ranking))) for name in ranking.best(PATHS_CHECKED)]
+
+    with suppress(Dropped):
+        yield members(likely_ranking)
+    yield members((yield "first_ranking"))
 
 
 def _best_in_time(study: UnitStudy, first_ranking: core.Ranking) -> Growth:
@@ -281,6 +298,7 @@ class UnitStudy(UnitMotion):
         wanted=_by_pressure,
         parallel=True,
         says=lambda found: core.words_on_solved(found),
+        doing=_sought,
     )
     def candidates(
         self,
@@ -311,6 +329,7 @@ class UnitStudy(UnitMotion):
         ),
         wanted=_by_pressure,
         parallel=True,
+        doing=lambda study, member: f"{_sought(study, member)}, from rest",
     )
     def followed(self, number: int, pressures_kPa: tuple[float, ...], waveguides: Any) -> core.Followed:
         """A candidate along its whole path from rest."""
@@ -336,6 +355,18 @@ class UnitStudy(UnitMotion):
     def marched(self, number: int, waveguides: Any, samples: core.Samples) -> core.Array:
         """Anchors (k, p, 3) in mm of a candidate at each instant, as far as it has an equilibrium."""
         return core.marched(waveguides, number, samples)
+
+    @intermediate(wanted=_by_pressure)
+    def likely_ranking(
+        self,
+        motion: fem.Trajectory,
+        compared: core.Comparison,
+        mechanics: core.Mechanics,
+        stations: int,
+        standing: core.Standing,
+    ) -> core.Ranking:
+        """The first ranking, if candidates from Model A's states end where their own paths do."""
+        return core.ranked(motion, compared, mechanics, stations, standing, None, None)
 
     @intermediate(wanted=_places)
     def first_ranking(
@@ -386,11 +417,12 @@ class UnitStudy(UnitMotion):
     @stage(
         "mesh check",
         taking("mesh check"),
-        over=Over(("pressure_kPa",), lambda study: [], grows=_extremes, after=("first_ranking",)),
+        over=Over(("pressure_kPa",), lambda study: [], grows=_extremes_on_coarse, after=("motion",)),
         wanted=_checks_by_pressure,
         failing="The mesh uncertainty is not known at {pressure_kPa:g} kPa: on the coarser mesh",
         parallel=True,
         says=state_message,
+        doing=state_sought,
     )
     def coarse_states(self, pressure_kPa: float, coarse_equilibrium: fem.Equilibrium) -> fem.State:
         """The state at an extreme pressure, from rest."""
@@ -405,11 +437,12 @@ class UnitStudy(UnitMotion):
             lambda study, member: {"coarse_states": list(member[1])},
             _at_pressures,
             grows=_best_on_coarse,
-            after=("first_ranking",),
+            after=("likely_ranking",),
         ),
         wanted=_checks_by_pressure,
         parallel=True,
         says=lambda found: core.words_on_solved(found),
+        doing=_sought,
     )
     def coarse_candidates(
         self,
@@ -498,6 +531,7 @@ class UnitStudy(UnitMotion):
         wanted=_checks_by_pressure,
         parallel=True,
         says=lambda found: core.words_on_solved(found),
+        doing=_sought,
     )
     def let_in(
         self,

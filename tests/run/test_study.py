@@ -6,6 +6,7 @@ import json
 import os
 import subprocess
 import sys
+from contextlib import suppress
 from functools import cached_property
 from pathlib import Path
 from types import MappingProxyType, MemberDescriptorType
@@ -421,6 +422,57 @@ def test_a_set_grows_from_its_results_and_a_resumed_one_alike(tmp_path):
     first = raced(tmp_path, sprints=True)
     assert first["times"]["1"]["4"] == 10.0
     assert raced(tmp_path, sprints=True) == first
+
+
+@attrs.frozen(kw_only=True, eq=False)
+class Guess(Study):
+    """Squares of likely numbers, beside which the right ones are found."""
+
+    name = "guess"
+    files = MappingProxyType({})
+    limit: int = setting(described("limit", 9, "largest number with a square", low=1, high=9))
+    workers: int = setting(described("workers", 1, "processes", low=1, high=8), decides=False)
+
+    def title(self):
+        return "Guess"
+
+    @stage("right", parallel=True)
+    def right(self, limit: int) -> tuple[int, ...]:
+        return (2, 3)
+
+    @stage("squares", over=Over(("x",), lambda s: [], grows=lambda s: s.numbers()), parallel=True)
+    def squares(self, x: int, limit: int) -> float:
+        if x > limit:
+            raise Dropped
+        return float(x * x)
+
+    @stage("sum")
+    def added(self, squares: dict) -> float:
+        return sum(squares.values())
+
+    def numbers(self):
+        with suppress(Dropped):
+            yield [3, 5]
+        yield (yield "right")
+
+    @section()
+    def result(self, squares, added):
+        yield Fact("squares", {str(x): s for x, s in squares.items()}, key="squares")
+        yield Fact("sum", added, key="sum")
+
+
+@pytest.mark.parametrize("workers", [1, 2])
+def test_a_set_begins_with_likely_members_and_ends_with_the_right_ones(tmp_path, workers):
+    context = RunContext(Progress())
+    Execution(Guess(workers=workers), tmp_path, context).run()
+    assert context.summary["squares"] == {"3": 9.0, "5": 25.0, "2": 4.0}
+    assert context.summary["sum"] == 38.0
+
+
+def test_a_likely_member_without_a_result_leaves_the_right_ones(tmp_path):
+    context = RunContext(Progress())
+    Execution(Guess(limit=4), tmp_path, context).run()
+    assert context.summary["squares"] == {"3": 9.0, "2": 4.0}
 
 
 @attrs.frozen(kw_only=True, eq=False)

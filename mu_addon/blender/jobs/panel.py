@@ -116,7 +116,8 @@ def _running(layout, child, prefix: str) -> None:
     row.operator(f"mu.{prefix}cancel", icon="CANCEL")
     fraction, text = whole(child, STAGE_LETTERS)
     layout.progress(factor=fraction, text=text)
-    details = [str(child.progress.get("detail", "")), child.estimate.why and f"Longer: {child.estimate.why}"]
+    doing = child.progress.get("waits_for") or child.progress.get("detail", "")
+    details = [str(doing), child.estimate.why and f"Longer: {child.estimate.why}"]
     latest = textwrap.wrap(next((text for text in reversed(details) if text), ""), CHARACTERS)
     # Always two lines, so that nothing below them moves.
     wrapped(layout, "\n".join([*latest, "", ""][:2]))

@@ -184,10 +184,11 @@ def uncertainty(
         known = extremes(samples.pressure_kPa[ranking.compared])
         at = [int(np.flatnonzero(samples.pressure_kPa == p)[0]) for p in known]
         few = Samples(np.arange(len(known), dtype=float), known, known)
-        standing = Standing()
-        for (name, _), one in (by_pressure or {}).items():
+        # Those at other pressures were begun before it was known which of them are compared.
+        there = {m[0]: one for m, one in (by_pressure or {}).items() if m[1] == tuple(known.tolist())}
+        standing, names = Standing(), tuple(there)
+        for name, one in there.items():
             standing.add(name, one)
-        names = tuple(name for name, _ in by_pressure or {})
         reached = {p for p in known.tolist() if all(p in standing.anchors.get(name, {}) for name in names)}
         standing.compared_kPa = sorted(reached)
         motion = motion_of(mesh, few, states or {})
