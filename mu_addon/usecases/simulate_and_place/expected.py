@@ -19,9 +19,9 @@ BEST = "solid with the best path"
 PATHS_MOTION = "motion of the paths"
 """Stage of the displacements, stresses and stretches of units with a sensor, for display."""
 FULL_S = {
-    "solid": 1.5, "mesh": 10.0, "Model A": 350.0, "candidates": 2140.0, "mesh check": 450.0, "map": 8.0,
-    PATHS_MOTION: 60.0,
-    "light": 7.0, BEST: 2.5, "ranking of the lattice's paths": 30.0, "check of the best paths": 2200.0,
+    "solid": 1.5, "mesh": 5.0, "Model A": 195.0, "candidates": 1400.0, "mesh check": 200.0, "map": 8.0,
+    PATHS_MOTION: 25.0,
+    "light": 7.0, BEST: 2.5, "ranking of the lattice's paths": 30.0, "check of the best paths": 1450.0,
     "motion of the best path": 60.0, "report": 14.0,
 }  # fmt: skip
 """Seconds on two cores, on the default mesh under the shipped protocol."""
@@ -30,8 +30,9 @@ UNSOLVED_REPORT_S = 7.0
 LEAST_S = {"Model A": 1.0, "candidates": 1.5, "mesh check": 3.5, "map": 0.3}
 """Seconds of a stage that are independent of the mesh, for stages that depend on it."""
 SOLVED = ("Model A", "candidates", "mesh check", "check of the best paths", PATHS_MOTION)
-TOUCHING = 6.0
-"""Factor on the seconds of a state at -20 kPa where walls touch; by the square of that."""
+TOUCHING = 3.0
+"""Factor on the seconds of a state at -20 kPa where walls touch, by the square of the pressure: those under
+pressure are solved beside it."""
 LEFT_UNDER_PRESSURE = 0.55
 """Share left out of the states after the highest pressure, of paths that are not the best, without suction:
 15 of 27 of `mu-1.0x`."""
