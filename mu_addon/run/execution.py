@@ -286,7 +286,7 @@ class Execution:
 
     def _begin_growth(self) -> None:
         """Begin the growth of the sets for which all is known that they take."""
-        for name in [*self.results.growing - self._growth.keys()]:
+        for name in [n for n in self.results.members if n in self.results.growing - self._growth.keys()]:
             over = self._stages[name].over
             assert over is not None
             assert over.grows is not None

@@ -292,8 +292,8 @@ class UnitStudy(UnitMotion):
             lambda study: [],
             _way,
             _at_pressures,
-            grows=lambda study: core.solving(study.compared, study.contest),
-            most=lambda study: 2 * len(study.candidate_paths),
+            grows=lambda study: core.solving(study.compared, study.contest, begin=True),
+            most=lambda study: len(study.candidate_paths) + study.contest.best,
         ),
         wanted=_by_pressure,
         parallel=True,
@@ -312,9 +312,45 @@ class UnitStudy(UnitMotion):
         return core.solved(waveguides, number, pressures_kPa, states, stations)
 
     @intermediate()
-    def standing(self, compared: core.Comparison, contest: Any, candidates: Members) -> core.Standing:
+    def begun(self, compared: core.Comparison, contest: Any, candidates: Members) -> core.Standing:
+        """Where the candidates stand once the most promising ones are solved."""
+        found: core.Standing = grown(core.solving(compared, contest, begin=True), candidates)
+        return found
+
+    @stage(
+        "candidates",
+        taking("candidates"),
+        over=Over(
+            ("number", "pressures_kPa"),
+            lambda study: [],
+            _way,
+            _at_pressures,
+            grows=lambda study, begun: core.solving(study.compared, study.contest, begun),
+            most=lambda study: len(study.candidate_paths) - study.contest.best,
+            after=("begun",),
+        ),
+        wanted=_by_pressure,
+        parallel=True,
+        says=lambda found: core.words_on_solved(found),
+        doing=_sought,
+    )
+    def contenders(
+        self,
+        number: int,
+        pressures_kPa: tuple[float, ...],
+        states: Members,
+        waveguides: Any,
+        stations: int,
+    ) -> core.Solved:
+        """A candidate that may still be among the best, at what it lacks."""
+        return core.solved(waveguides, number, pressures_kPa, states, stations)
+
+    @intermediate()
+    def standing(
+        self, compared: core.Comparison, contest: Any, begun: core.Standing, contenders: Members
+    ) -> core.Standing:
         """Where the candidates stand once the contest is over."""
-        found: core.Standing = grown(core.solving(compared, contest), candidates)
+        found: core.Standing = grown(core.solving(compared, contest, begun), contenders)
         return found
 
     @stage(
@@ -324,8 +360,8 @@ class UnitStudy(UnitMotion):
             ("number", "pressures_kPa"),
             lambda study: [],
             gives=_at_pressures,
-            grows=lambda study, standing: core.following(study.compared, standing),
-            after=("standing",),
+            grows=lambda study, begun: core.following(study.compared, begun),
+            after=("begun",),
         ),
         wanted=_by_pressure,
         parallel=True,
@@ -337,10 +373,10 @@ class UnitStudy(UnitMotion):
 
     @intermediate()
     def path_check(
-        self, compared: core.Comparison, standing: core.Standing, followed: Members
+        self, compared: core.Comparison, begun: core.Standing, followed: Members
     ) -> core.PathCheck:
         """Whether candidates from Model A's states end where their own paths do."""
-        found: core.PathCheck = grown(core.following(compared, standing), followed)
+        found: core.PathCheck = grown(core.following(compared, begun), followed)
         return found
 
     # Candidates where history acts.
@@ -363,10 +399,10 @@ class UnitStudy(UnitMotion):
         compared: core.Comparison,
         mechanics: core.Mechanics,
         stations: int,
-        standing: core.Standing,
+        begun: core.Standing,
     ) -> core.Ranking:
-        """The first ranking, if candidates from Model A's states end where their own paths do."""
-        return core.ranked(motion, compared, mechanics, stations, standing, None, None)
+        """The ranking of the most promising candidates: most likely the best ones."""
+        return core.ranked(motion, compared, mechanics, stations, begun, None, None)
 
     @intermediate(wanted=_places)
     def first_ranking(
@@ -606,12 +642,14 @@ class UnitStudy(UnitMotion):
         path_check: core.PathCheck,
         last_standing: core.Standing,
         candidates: Members,
+        contenders: Members,
         let_in: Members | None = None,
     ) -> core.PathMotion:
         """Displacement, stress and stretch of the unit with a sensor, against Model A's."""
         if not path_check.independent or path in last_standing.at_least_mm:
             raise Dropped
-        return painter.of(core.differences(path, {**candidates, **(let_in or {})}, last_standing))
+        found = {**candidates, **contenders, **(let_in or {})}
+        return painter.of(core.differences(path, found, last_standing))
 
     @stage(
         "map",

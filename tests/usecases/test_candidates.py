@@ -45,7 +45,7 @@ def answered(growth, answer):
         return end.value, every
 
 
-def ranked(contest=None, count=3, pressures=PRESSURES, before=None):
+def ranked(contest=None, count=3, pressures=PRESSURES, before=None, begin=False):
     """So many candidates through a protocol: standing, path check, deviations, and what was asked."""
     names = [f"path{n}" for n in range(count)]
     samples = Samples(np.arange(float(len(pressures))), pressures, pressures)
@@ -54,7 +54,7 @@ def ranked(contest=None, count=3, pressures=PRESSURES, before=None):
     states = {round(s.pressure_kPa, 9): s for s in motion.solved}
     sensors = Waveguides(UNIT, motion.mesh, (), ANCHORS)
     found, asked = answered(
-        solving(compared, contest, before),
+        solving(compared, contest, before, begin),
         lambda name, at: solved(sensors, names.index(name), at, states, STATIONS, whole=False),
     )
     check, along = answered(
@@ -161,9 +161,9 @@ def test_a_path_that_ends_on_its_way_from_rest_ends_the_comparison_there(monkeyp
 # Candidate n of the made-up sensors bends the unit by a further hundredth less than the one before.
 
 
-def contested(contest, before=None):
+def contested(contest, before=None, begin=False):
     """A contest of ten candidates through a grasp."""
-    return ranked(contest, 10, GRASP, before)
+    return ranked(contest, 10, GRASP, before, begin)
 
 
 def test_a_candidate_that_cannot_be_among_the_best_is_left_with_a_bound():
@@ -178,6 +178,17 @@ def test_a_candidate_that_cannot_be_among_the_best_is_left_with_a_bound():
     for name, bound in some.standing.at_least_mm.items():
         assert some.deviations["path2"].J_hat < bound < every.deviations[name].J_hat
     assert some.check.difference_mm == every.check.difference_mm
+
+
+@pytest.mark.parametrize("contest", [Contest(1), Contest(3), Contest(3, every=True)])
+def test_a_contest_that_is_begun_and_then_decided_asks_for_what_one_at_once_does(contest):
+    begun, whole = contested(contest, begin=True), contested(contest)
+    assert [*begun.deviations] == [f"path{n}" for n in range(contest.best)]
+    decided = contested(contest, begun.standing)
+    assert begun.asked + decided.asked == whole.asked
+    assert decided.standing.at_least_mm == whole.standing.at_least_mm
+    for name, deviation in whole.deviations.items():
+        assert np.array_equal(deviation.delta, decided.deviations[name].delta)
 
 
 def test_what_a_margin_lets_in_again_is_solved_from_what_is_there():

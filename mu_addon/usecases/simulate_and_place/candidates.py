@@ -211,12 +211,15 @@ class _MissedError(Exception):
         self.name, self.pressure_kPa, self.why = name, pressure_kPa, why
 
 
-def solving(compared: Comparison, contest: Contest | None, before: Standing | None = None) -> Solving:
+def solving(
+    compared: Comparison, contest: Contest | None, before: Standing | None = None, begin: bool = False
+) -> Solving:
     """Yield the candidates and pressures to solve, get their solutions, and return where they stand.
 
     What is solved depends on the solutions alone. contest: solve no candidate further that cannot be among
-    its best; None: all alike. before: what is solved already. A pressure that a candidate
-    misses is compared for none, and neither are those beyond it. Raises ConvergenceError where none is left.
+    its best; None: all alike. before: what is solved already. begin: end once as many candidates as are to be
+    the best are solved, the most promising. A pressure that a candidate misses is compared for none, and
+    neither are those beyond it. Raises ConvergenceError where none is left.
     """
     # What is added must not change the standing that a check of paths was taken from.
     known = Standing() if before is None else deepcopy(before)
@@ -226,7 +229,7 @@ def solving(compared: Comparison, contest: Contest | None, before: Standing | No
     while True:
         try:
             if contest is not None and few:
-                yield from _contested(compared, contest, known)
+                yield from _contested(compared, contest, known, begin)
             else:
                 yield from _rounds(compared, known)
             return known
@@ -250,11 +253,11 @@ def _solve(
 
 
 def _contested(
-    compared: Comparison, contest: Contest, known: Standing
+    compared: Comparison, contest: Contest, known: Standing, begin: bool
 ) -> Generator[list[Member], Sequence[Solved], None]:
     """All candidates at the first pressures, the most promising at all others, then those still open.
 
-    Pressure by pressure: what cannot be among the best is solved no further.
+    Pressure by pressure: what cannot be among the best is solved no further. begin: without those still open.
     """
     loaded = [p for p in compared.loaded_kPa if p in known.compared_kPa]
     first, rest = ([loaded[n] for n in order] for order in first_and_rest(np.array(loaded)))
@@ -273,12 +276,12 @@ def _contested(
         return lower_bounds(distance, instants), np.isfinite(distance[is_loaded]).all(axis=0)
 
     yield from _solve(known, compared.names, first)
-    if rest:
+    if rest and standing()[1].sum() < contest.best:
         best = np.sort(np.argsort(standing()[0], kind="stable")[: contest.best])
         yield from _solve(known, names[best].tolist(), rest)
-    for pressure in rest:
+    for pressure in () if begin else rest:
         yield from _solve(known, names[contest.open(*standing())].tolist(), [pressure])
-    left = names[~standing()[1]].tolist()
+    left = [] if begin else names[~standing()[1]].tolist()
     if contest.every and left:
         asked = [(name, lack) for name in left if (lack := known.lacks(name, rest))]
         for (name, _), one in zip(asked, (yield asked) if asked else (), strict=True):
