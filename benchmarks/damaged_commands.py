@@ -27,17 +27,15 @@ import sys
 import tempfile
 import time
 from collections import Counter
-from importlib import import_module
 from pathlib import Path
 
 import numpy as np
 
 from benchmarks.table import ROOT, circumstances, options_of, print_head
-from mu_addon import design
+from mu_addon import design, studies
 from mu_addon.cli import main as command_line
 from mu_addon.design.parameters import load_preset, to_toml
 from mu_addon.design.surface import stl_bytes
-from mu_addon.usecases.resume import MODULES
 from mu_addon.usecases.simulate_and_place import light
 from tests.design.printing import parts
 from tests.run.test_mutated_files import CORPUS, INDEX, RECORDING, mutated
@@ -302,8 +300,8 @@ def main():
     parser.add_argument("--keep", type=Path, help="folder for the files of what goes wrong")
     given = parser.parse_args()
     SECONDS[0] = given.seconds
-    for module in MODULES.values():
-        import_module(module, "mu_addon.usecases")
+    for name in studies.STUDIES:
+        studies.study(name)
     print(circumstances(), f"Seed {given.seed}.\n")
     print_head("kind", "computed", "refused", "at work", "in processes", "MB at most", "wrong")
     every = []

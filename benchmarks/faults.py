@@ -34,7 +34,7 @@ from mu_addon.run.context import run_to_end
 from mu_addon.run.execution import Execution
 from mu_addon.run.folder import keep_inputs
 from mu_addon.run.progress import Progress
-from mu_addon.studies.use_case import begin_study
+from mu_addon.studies.starting import begin_study
 from tests.headless.test_resume import JOB as COARSE
 from tests.run.failing_files import failing
 from tests.run.failing_memory import short_of_memory

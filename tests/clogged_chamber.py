@@ -14,7 +14,7 @@ from mu_addon.measured import read_folder
 from mu_addon.run.context import run_to_end
 from mu_addon.run.progress import Progress
 from mu_addon.studies.diagnose import Diagnose
-from mu_addon.studies.use_case import use_case
+from mu_addon.studies.starting import start
 
 from .evidence import analytic
 from .made_once import made_once
@@ -42,7 +42,7 @@ def judge(folder, gauge_kPa=0.0):
                 unit=load_preset("mu-1.0x"),
                 settings=unit_fem.UnitSettings(changes=None, whole=None),
             )
-            use_case("diagnose").start(job, folder / "study" / "evidence", context)
+            start(job, folder / "study" / "evidence", context)
     assert context.status == 0, messages[-1]
     (folder / "said.json").write_text(json.dumps(messages, default=str))
     return folder

@@ -24,7 +24,7 @@ from mu_addon.meshing.settings import MeshSettings
 from mu_addon.run.context import RunContext
 from mu_addon.run.progress import Progress
 from mu_addon.studies.diagnose import Diagnose
-from mu_addon.studies.use_case import use_case
+from mu_addon.studies.starting import start
 from mu_addon.usecases.diagnose.unknown import unknown_of
 
 DATA = Path(__file__).parents[2] / "assets" / "examples" / "paper-bending"
@@ -54,7 +54,7 @@ def main() -> None:
     unknown = unknown_of(options.unknown, load_preset(PRESET)) if options.unknown else None
     study = Diagnose(data=read_folder(DATA), settings=settings, unknown=unknown)
     context = RunContext(Progress())
-    use_case("diagnose").start(study.complete(), options.folder, context)
+    start(study.complete(), options.folder, context)
     if unknown is not None:
         print_shapes(context.summary.pop("unknown"))
     print(json.dumps(context.summary, indent=1, default=str))

@@ -12,8 +12,8 @@ from mu_addon.fem.protocol import Protocol
 from mu_addon.run.context import RunContext
 from mu_addon.run.execution import Execution
 from mu_addon.run.progress import Progress
+from mu_addon.studies.starting import begin_study
 from mu_addon.studies.unit_ranking import UnitStudy
-from mu_addon.studies.use_case import begin_study
 
 
 def outward(pressures_kPa: Sequence[float]) -> Protocol:

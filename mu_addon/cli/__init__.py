@@ -53,9 +53,10 @@ class Command(NamedTuple):
 
 
 def _command(name: str) -> Command:
-    from ..studies import STUDIES
+    from ..studies import STUDIES, study
 
-    if (command := name.rstrip("_").replace("_", "-")) in STUDIES:
+    command = name.rstrip("_").replace("_", "-")
+    if command in STUDIES and (study(command).example or study(command).commands):
         from .studies import command_of
 
         return Command(*command_of(command))

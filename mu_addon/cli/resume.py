@@ -48,7 +48,7 @@ def run(options: argparse.Namespace, context: RunContext) -> None:
     """Run a folder's inputs with its command's options, taking finished stages from the cache."""
     from ..fem.device import DEVICE, require_device
     from ..run.summary import SUMMARY, read_summary
-    from ..usecases.resume import resume
+    from ..studies.starting import resume
 
     require_out(options)
     before = read_summary(Path(options.out) / SUMMARY)

@@ -173,7 +173,7 @@ def _add_values(command: Any, one: Input) -> None:
 
 
 def _run(kind: type[Study], name: str, options: argparse.Namespace, context: RunContext) -> None:
-    from ..studies.use_case import use_case
+    from ..studies.starting import start
 
     require_out(options)
     if hasattr(options, "device"):
@@ -196,4 +196,4 @@ def _run(kind: type[Study], name: str, options: argparse.Namespace, context: Run
         study = kind.read_file(Path(options.file), (kind.name, kind.from_file[1]), values)
     else:
         study = kind(**values).complete()
-    use_case(name).start(study, Path(options.out), context)
+    start(study, Path(options.out), context)

@@ -19,7 +19,7 @@ from ..errors import MuError
 from ..reading import file_bytes, is_number
 from ..run.cache import key as hashed
 from ..run.inputs import digest
-from ..run.usecase import UseCase
+from ..run.study import Study
 from .check import Fault, faults
 from .definition import FILE, FOLDER, Call, Definition, Definitions, Outputs
 from .tree import Node, NodeTree, Source
@@ -44,35 +44,34 @@ class NodeError(MuError):
 
 @attrs.frozen
 class Order:
-    """A run that a node needs: its use case and its job.
+    """A run that a node needs: of a study.
 
-    after: folder of a run whose cache is reused, without effect on results. answers: a verdict in its summary
-    is a result, even if the run ends with an error because of it.
+    after: folder of a run whose cache is reused, without effect on results.
     """
 
-    use_case: UseCase[Any]
-    job: Any
+    study: Study
     after: Path | None = None
-    answers: bool = False
 
     def is_done(self, summary: Mapping[str, Any]) -> bool:
         """True if the run with this summary need not be repeated."""
-        return summary.get("status") == "complete" or (self.answers and "verdict" in summary)
+        node = self.study.node_of(self.study.command)
+        answers = node is not None and node.answers and "verdict" in summary
+        return summary.get("status") == "complete" or answers
 
     @property
     def key(self) -> str:
         """Hash of its files of inputs."""
-        return hashed(
-            self.use_case.name, *(part for item in sorted(self.job.texts().items()) for part in item)
-        )
+        texts = self.study.texts()
+        return hashed(self.study.command, *(part for item in sorted(texts.items()) for part in item))
 
 
 @attrs.frozen
 class Finished:
-    """A finished run: its folder and its summary."""
+    """A finished run: its folder, its summary, and its study if that is known."""
 
     folder: Path
     summary: Mapping[str, Any]
+    study: Study | None = None
 
     @property
     def cost_s(self) -> float:

@@ -11,8 +11,9 @@ from ..files import write_json
 from ..reading import file_bytes, is_number, parse_json
 from .definition import NUMBER, Definition, Outputs
 from .evaluation import Record, State
-from .runs import FOLDER
 
+FOLDER = "nodes"
+"""Folder of the runs within that of the tree."""
 NAME = "records.json"
 # No file of records is longer, in bytes; of more records the oldest are dropped.
 LONGEST, MOST_RECORDS = 1 << 24, 5000

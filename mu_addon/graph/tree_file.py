@@ -16,9 +16,11 @@ unit = ["Unit.unit"]     # output `unit` of the node `Unit`
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+import re
 from pathlib import Path
 from typing import Any
+
+import attrs
 
 from ..errors import InputError
 from ..toml_reader import TomlTable, parsed_toml, read_toml
@@ -27,12 +29,19 @@ from .tree import Node, NodeTree, Source
 
 FORMAT = 1
 HEADER = "# A node tree; `run.py graph` evaluates it."
+STATES = "nodes.json"
+"""File of the states of an evaluated tree's nodes."""
 # Far more than any tree that somebody wires.
 MOST_NODES = 10_000
 
 
-def tree_text(tree: NodeTree, run: Mapping[str, Any] | None = None) -> str:
-    """TOML text of a tree; run: more for its table [run], which decides no result."""
+def tree_text(tree: NodeTree) -> str:
+    """TOML text of a tree."""
+    return toml_text({"format": FORMAT, **tree_keys(tree)}, HEADER)
+
+
+def tree_keys(tree: NodeTree) -> dict[str, Any]:
+    """The keys of a tree's file."""
     nodes = {}
     for name, node in tree.nodes.items():
         table: dict[str, Any] = {"kind": node.kind}
@@ -49,8 +58,7 @@ def tree_text(tree: NodeTree, run: Mapping[str, Any] | None = None) -> str:
                 key: [f"{s.node}.{s.output}" for s in sources] for key, sources in node.links.items()
             }
         nodes[name] = table
-    values = {"format": FORMAT, "name": tree.name, "nodes": nodes, **({"run": run} if run else {})}
-    return toml_text(values, HEADER)
+    return {"name": tree.name, "nodes": nodes}
 
 
 def read_tree(path: str | Path) -> NodeTree:
@@ -65,7 +73,13 @@ def parse_tree(text: str, origin: str = "node tree") -> NodeTree:
 
 def tree_of(document: TomlTable) -> NodeTree:
     """The tree in a TOML document; raises InputError."""
-    document.of_format(FORMAT).only(("format", "name", "nodes", "run"))
+    keys = {k: v for k, v in document.of_format(FORMAT).values.items() if k not in ("format", "run")}
+    return tree_of_keys(attrs.evolve(document, values=keys))
+
+
+def tree_of_keys(document: TomlTable) -> NodeTree:
+    """The tree of the keys of its file; raises InputError."""
+    document.only(("name", "nodes"))
     name, nodes = document.word("name", default="node tree"), document.inner("nodes")
     _require_name(name, document.at("name"))
     if not nodes.values:
@@ -99,6 +113,11 @@ def _sources(links: TomlTable, key: str) -> tuple[Source, ...]:
             raise InputError(f"{text!r} is not a link", links.at(key), 'give "NODE.OUTPUT", or several in []')
         found.append(Source(node, output))
     return tuple(found)
+
+
+def file_name(node: str) -> str:
+    """A node's name as part of a file's: letters, digits, dots, hyphens and underscores."""
+    return re.sub(r"[^\w.-]+", "_", node)
 
 
 def _require_name(value: str, where: str) -> None:

@@ -4,12 +4,8 @@ from __future__ import annotations
 
 import time
 from collections import deque
-from collections.abc import Callable, Iterable, Mapping, Sequence
-from pathlib import Path
+from collections.abc import Callable, Mapping, Sequence
 from typing import Any
-
-from ..errors import InputError
-from ..reading import file_bytes, parse_json
 
 Plan = Sequence[tuple[str, float]]
 """Stages of a run in order, with the expected seconds of each."""
@@ -234,42 +230,3 @@ class ProgressEstimate:
         shown_long = self._clock() - self._grown_at >= SHOWN_S
         if shown_long and left <= LONGER * self._grown_from + SLACK_S:
             self.why = ""
-
-
-def shares_done(folder: Path) -> dict[str, float]:
-    """Largest share done of each stage, 0..1, that log.ndjson of a folder holds; empty without one.
-
-    Of these inputs alone: with others the log is set aside.
-    """
-    done: dict[str, float] = {}
-    try:
-        lines = file_bytes(folder / "log.ndjson").splitlines()
-    except (OSError, InputError):
-        return done
-    for line in lines:
-        try:
-            message = parse_json(line, "log.ndjson")
-        except InputError:
-            # Cut short by a kill.
-            continue
-        if isinstance(message, dict) and message.get("type") == "progress":
-            share = message.get("fraction")
-            stage = str(message.get("stage"))
-            if isinstance(share, int | float):
-                done[stage] = max(done.get(stage, 0.0), min(float(share), 1.0))
-    return done
-
-
-def remaining(plan: Plan, done: dict[str, float], kept: Iterable[str]) -> Plan:
-    """The plan's stages, with the seconds of the remaining work.
-
-    kept: beginnings of the names of stages whose finished work a folder's cache holds; the others run again.
-    """
-    beginnings = tuple(kept)
-
-    def left(name: str, seconds: float) -> float:
-        if not name.startswith(beginnings):
-            return seconds
-        return max((1.0 - done.get(name, 0.0)) * seconds, min(LOADED * seconds, LOADED_S))
-
-    return [(name, left(name, seconds)) for name, seconds in plan]

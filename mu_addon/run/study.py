@@ -40,6 +40,7 @@ from .folder import RUN, FolderLayout
 from .inputs import FORMAT, INPUTS, digest, read_inputs
 
 if TYPE_CHECKING:
+    from .context import RunContext
     from .progress import Progress
 
 _INPUT, _STAGE, _DERIVED, _SECTION = "input", "_stage", "_derived", "_section"
@@ -387,10 +388,13 @@ def section(key: str = "", title: str = "", order: int = 0) -> Callable[[Any], A
 class Node:
     """The node of a study: menu, text, outputs as (name, type, text); remark: on a finished run's summary.
 
-    label: in menus, if not the name of the class; read: its outputs by name, of a finished run (folder and
-    summary), where they are not that run; answers: a verdict in the summary is a result, even if the
-    run ends with an error because of it; hidden: inputs that the node leaves at their defaults; no_body:
-    names the study in the error of a unit with a body of its own, which it does not take.
+    label: in menus, if not the name of the class; read: its outputs by name, of a finished run (folder,
+    summary and study) and the node's call, where they are not that run; answers: a verdict in the summary is
+    a result, even if the run ends with an error because of it; hidden: inputs that the node leaves at their
+    defaults; shown: the inputs that it asks for, if not all others; settings: of the node alone; no_body:
+    names the study in the error of a unit with a body of its own, which it does not take. continues: socket
+    of a finished run of the same study, whose other inputs and cache it takes. passes: socket that a muted
+    node passes on as its output, and what that does, as text.
     """
 
     category: str
@@ -398,10 +402,14 @@ class Node:
     outputs: tuple[tuple[str, str, str], ...]
     remark: Callable[[Mapping[str, Any]], str]
     label: str = ""
-    read: Callable[[Any], Mapping[str, Any]] | None = None
+    read: Callable[[Any, Any], Mapping[str, Any]] | None = None
     answers: bool = False
     hidden: tuple[str, ...] = ()
+    shown: tuple[str, ...] = ()
+    settings: tuple[Any, ...] = ()
     no_body: str = ""
+    continues: str = ""
+    passes: tuple[str, str] = ("", "")
 
 
 @attrs.frozen
@@ -439,9 +447,11 @@ class Study:
     name: of its command; its inputs are in `name`.toml. from_file: of a command that reads such a file, and
     whose options replace values in it: help on the file, and what to do where it cannot be read. files:
     content of each file of the run's folder, by name or pattern; to_fill: files that are filled in by hand,
-    which no run removes. example: a command line. node: None of a study that is no node. joins: its folder
-    is one that several studies add to, such as one of measured data: it keeps no inputs and no results there,
-    is not resumed, and begins to use it with its first file. page: name of its report, "" without one.
+    which no run removes. example: a command line, "" of a study that is no command. node: None of a study
+    that is no node; nodes: in its place by target, of those that are. streams: it has no stages, but does its
+    work by itself (`work`). joins: its folder is one that several studies add to, such as one of measured
+    data: it keeps no inputs and no results there, is not resumed, and begins to use it with its first file.
+    page: name of its report, "" without one.
 
     commands: of a study of several, its targets, each with help and example by its name, in order of need.
     They share a folder: each has the inputs and stages of those before it, and a table of its own in the
@@ -455,6 +465,8 @@ class Study:
     from_file: ClassVar[tuple[str, str]] = ("", "")
     example: ClassVar[str] = ""
     node: ClassVar[Node | None] = None
+    nodes: ClassVar[Mapping[str, Node]] = _NONE
+    streams: ClassVar[bool] = False
     commands: ClassVar[Mapping[str, tuple[str, str]]] = _NONE
     file: ClassVar[str] = ""
     version: ClassVar[int] = FORMAT
@@ -466,6 +478,11 @@ class Study:
     def wanted_targets(self) -> tuple[str, ...]:
         """Its targets up to the one that it is run for: its input `stages`; "" alone for a study without."""
         return tuple(getattr(self, "stages", ("",))) if self.commands else ("",)
+
+    @property
+    def command(self) -> str:
+        """Name of the command that runs it: that of its last target, if it has any."""
+        return self.wanted_targets[-1] or self.name
 
     @property
     def processes(self) -> int:
@@ -484,6 +501,15 @@ class Study:
     def subtitle(self) -> str:
         """The line below the title."""
         return ""
+
+    @classmethod
+    def node_of(cls, command: str) -> Node | None:
+        """The node that runs a command of the study, if there is one."""
+        return cls.nodes.get(command, cls.node)
+
+    def work(self, folder: Path, context: RunContext) -> Any:
+        """The work of a study that streams, in its folder; it fills `context.summary`."""
+        raise NotImplementedError
 
     # What the declaration says, for the faces.
 
@@ -512,7 +538,7 @@ class Study:
     def layout(cls) -> FolderLayout:
         """The files of its folder."""
         optional = tuple(file for name, one in cls.inputs().items() for file in one.file_names(name))
-        results = (*cls.files, cls.page)
+        results = (*cls.files, *([cls.page] if cls.page else []))
         header = cls.header or f"# Inputs of `{cls.name}`."
         return FolderLayout(f"{cls.file or cls.name}.toml", header, results, optional, cls.to_fill)
 
@@ -681,10 +707,12 @@ class Study:
             )
         for name, value in replaced.items():
             one = cls.inputs()[name]
-            more = parse_toml(toml_text(one.write(name, value).keys, ""), name)
+            written = one.write(name, value)
+            keys, more = (parse_toml(toml_text(table, ""), name) for table in (written.keys, written.run))
             tables[one.target] = attrs.evolve(
-                tables[one.target], values={**tables[one.target].values, **more}
+                tables[one.target], values={**tables[one.target].values, **keys}
             )
+            run |= more
         return cls.of_tables({target: tables[target] for target in targets}, path, run, tuple(replaced))
 
     @classmethod

@@ -32,7 +32,7 @@ class Calibrate(Study):
             ("error", "number", "error in sweeps left out of the fit, in deg"),
         ),
         lambda summary: f"error {summary['error_deg']:.2g} deg",
-        read=lambda done: {
+        read=lambda done, call: {
             "calibration": done.folder / "calibration.toml",
             "error": float(done.summary["error_deg"]),
         },

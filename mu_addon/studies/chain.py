@@ -10,8 +10,8 @@ from typing import Any
 import attrs
 
 from .. import chain, design, fem, meshing
-from ..chain.settings import GRAVITY, ORIENTATION, REFINE, TIMES, TIP_MASS
-from ..design.quantity import described
+from ..chain.settings import GRAVITY, LOADED, ORIENTATION, PRESSURE_STEP, REFINE, TIMES, TIP_MASS
+from ..design.quantity import Description, described
 from ..design.settings import USUAL_RESIN
 from ..errors import InputError
 from ..run.parts import Beside, Chart, Fact, File, Part, Pictures, Sentence, Table, Warn, csv, echo, recorded
@@ -19,6 +19,7 @@ from ..run.study import (
     Found,
     Input,
     Members,
+    Node,
     Over,
     Study,
     Tell,
@@ -78,6 +79,19 @@ class MeshTable:
     """Table [mesh]."""
 
     refine: float = REFINE.field()
+
+
+@attrs.frozen
+class TableInput(Input):
+    """A table of settings, made by `of`; a command reads it from a file alone."""
+
+    kind: str = "table"
+    settings: tuple[Description, ...] = ()
+    of: Callable[..., Any] = MeshTable
+
+    def made(self, values: tuple[Any, ...], given: Mapping[str, Any]) -> Any:
+        """The table of the settings' values; raises InputError."""
+        return self.of(**{d.name: value for d, value in zip(self.settings, values, strict=True)})
 
 
 @attrs.frozen
@@ -168,6 +182,20 @@ class Chain(Study):
     """
 
     name = "chain"
+    node = Node(
+        "Chain",
+        "units in series under gravity and a load at the tip",
+        (
+            ("tip", "file", "tip.csv, or target.csv with a point to reach"),
+            ("angle", "number", "angle of the tip relative to the base, degrees"),
+        ),
+        lambda summary: "tip at {:.1f}, {:.1f}, {:.1f} mm".format(*summary["chain"]["tip_mm"]),
+        read=lambda done, call: {
+            "tip": done.folder / ("target.csv" if "target" in done.summary else "tip.csv"),
+            "angle": float(done.summary["chain"]["angle_deg"]),
+        },
+        hidden=("resin",),
+    )
     example = "chain assets/examples/trunk/chain.toml --out out/trunk"
     from_file = (
         "The chain, a chain.toml: its units, loads, protocol or target. Options replace its values.",
@@ -196,8 +224,11 @@ class Chain(Study):
         described("resin", USUAL_RESIN, "resin of the library, for the units' weight"), metavar="NAME"
     )
     times: int = setting(TIMES, metavar="N")
-    mesh: MeshTable = given(Input("table"), factory=MeshTable)
-    joint: chain.Sampling = given(Input("table"), factory=lambda: chain.Sampling())
+    mesh: MeshTable = given(TableInput(settings=(REFINE,)), factory=MeshTable)
+    joint: chain.Sampling = given(
+        TableInput(settings=(PRESSURE_STEP, LOADED), of=lambda **values: chain.Sampling(**values)),
+        factory=lambda: chain.Sampling(),
+    )
 
     def __attrs_post_init__(self) -> None:
         if not 1 <= len(self.units) <= MOST_UNITS:

@@ -141,7 +141,7 @@ class Diagnose(Study):
             ("model", "model", "the extended model, for a node Simulate"),
         ),
         "{verdict}: {headline}".format_map,
-        read=lambda done: {"diagnosis": done, "model": done.folder / "model.toml"},
+        read=lambda done, call: {"diagnosis": done, "model": done.folder / "model.toml"},
         hidden=("known", "unknown"),
     )
 

@@ -51,7 +51,7 @@ class Measure(Study):
         (("data", "data", "an experiment of a unit under pressure"),),
         lambda summary: "{:.3g} to {:.3g} deg".format(*summary["angle_deg"]),
         label="Measured Motion",
-        read=lambda done: {"data": measured.read_folder(done.folder)},
+        read=lambda done, call: {"data": measured.read_folder(done.folder)},
     )
 
     recording: Path = given(PlaceInput(kind="recording", what="recording"))

@@ -14,10 +14,12 @@ from .. import design as designs
 from .. import evidence, optimization
 from ..design.quantity import described
 from ..errors import InputError
+from ..graph.definition import Setting
 from ..optimization.settings import BODY, DESIGN, RESIN, UNIT, WORKERS
 from ..run.parts import Beside, Chart, Fact, File, Part, Sentence, Table, Warn, csv, echo, recorded
 from ..run.study import (
     Dropped,
+    Node,
     Over,
     Study,
     derived,
@@ -36,6 +38,7 @@ _A_STATE_S, _BY_REFINEMENT = 76.0, 1.8
 """Seconds of a state with its slopes at a refinement of 1, and the exponent of the refinement."""
 _CHECKED, _APART = 1.2, 3.0
 """Factors on that of a unit that is checked, and of walls and struts that are kept apart."""
+PROPOSED = described("proposed", 1, "which of the proposed units", low=1, high=MOST_CHECKED)
 NO_UNIT = "breaks a rule of units"
 
 Units = Mapping[Any, "optimization.Evaluated"]
@@ -90,12 +93,38 @@ class DesignInput(FileInput):
         return (DESIGN, UNIT, RESIN, "resin-*.toml", BODY)
 
 
+def _of_node(done: Any, call: Any) -> dict[str, Any]:
+    """The unit that a node gives of a finished search, and a remark on it; raises InputError."""
+    rows, number = done.summary["proposed"], call.settings[PROPOSED.name]
+    if number > len(rows):
+        raise InputError(
+            f"{len(rows)} units are proposed: there is no number {number}",
+            PROPOSED.name,
+            f"choose 1 to {len(rows)}" if rows else f"see the outcome: {done.summary['outcome']}",
+        )
+    row, design = rows[number - 1], call.inputs["unit"]
+    unit = attrs.evolve(designs.read_unit(done.folder / row["file"]), name=design.unit.name)
+    missed = [target["name"] for target in row["targets"] if not target["met"]]
+    remark = f"misses {', '.join(missed)}" if missed else "meets every target"
+    return {"unit": attrs.evolve(design, unit=unit, path=row.get("path", design.path)), "remark": remark}
+
+
 @attrs.frozen(kw_only=True, eq=False)
 class Optimize(Study):
     """Find units that meet targets: bending angles, stiffness, stretch, mass, printability and more."""
 
     name = "optimize"
     example = "optimize assets/examples/stronger-finger/design.toml --out out/finger"
+    node = Node(
+        "Optimize",
+        "a unit that meets the targets of a design.toml, found from the linked one",
+        (("unit", "unit", "the proposed unit"),),
+        lambda summary: "",
+        read=_of_node,
+        hidden=("scheduler",),
+        settings=(Setting(PROPOSED),),
+        passes=("unit", "the unit is passed on unchanged"),
+    )
     files = {
         "designs.csv": "every unit that was computed: its freedoms, and the targets' values",
         "proposed-*.toml": "the proposed units",

@@ -3,7 +3,10 @@
 from __future__ import annotations
 
 import itertools
+import math
 from collections.abc import Iterator, Mapping, Sequence
+from csv import DictReader
+from csv import Error as CsvError
 from functools import cached_property, partial
 from pathlib import Path
 from typing import Any
@@ -12,9 +15,10 @@ import attrs
 
 from .. import design
 from ..design.quantity import described
-from ..reading import parse_json
+from ..errors import InputError
+from ..reading import parse_json, text_in
 from ..run.parts import Beside, Chart, Fact, Part, Sentence, Table, csv, echo, recorded
-from ..run.study import Dropped, Found, Input, Over, Study, Written, given, section, stage
+from ..run.study import Dropped, Found, Input, Node, Over, Study, Written, given, section, stage
 from ..usecases import parameter_study
 from ..usecases.parameter_study.settings import ADD, WORKERS
 from ..usecases.simulate_and_place.settings import STAGES
@@ -75,6 +79,62 @@ def _expected_s(study: Sweep) -> float:
     return study.plan.size / len(numbers) * sum(seconds) / min(max(study.workers, 1), 2)
 
 
+@attrs.frozen(eq=False)
+class StudyTable:
+    """A finished parameter study: its plan, folder, and a row for each point as in points.csv."""
+
+    plan: parameter_study.Plan
+    folder: Path
+    rows: tuple[Mapping[str, str], ...]
+
+    @property
+    def done(self) -> tuple[Mapping[str, str], ...]:
+        """Rows of the studies that were solved."""
+        return tuple(row for row in self.rows if row["status"] == "done")
+
+    def remark(self) -> str:
+        """Number of studies, and of failed ones."""
+        failed = len(self.rows) - len(self.done)
+        return f"{len(self.rows)} studies" + (f", {failed} failed" if failed else "")
+
+    @property
+    def columns(self) -> tuple[str, ...]:
+        """Names of the figures' columns in which some study has a number."""
+        inputs = ("point", "status", *(v.name for v in self.plan.variables), *LAST)
+        names = dict.fromkeys(name for row in self.done for name in row if name not in inputs)
+        return tuple(name for name in names if any(number_in(row, name) is not None for row in self.done))
+
+
+def table_of(done: Any) -> StudyTable:
+    """Table of a parameter study; raises InputError where it has no usable row."""
+    path = done.folder / TABLE
+    try:
+        rows = tuple(DictReader(text_in(path, TABLE, "evaluate this node again").splitlines()))
+    except CsvError as error:
+        raise InputError(f"cannot read {TABLE}: {error}", str(path), "evaluate this node again") from error
+    found = StudyTable(done.study.plan, done.folder, rows)
+    if not found.done:
+        why = next((row.get("what", "") for row in rows if row.get("what")), "see its table")
+        raise InputError(
+            f"every study failed: {why}", str(path), "see points.csv; vary less, or other inputs"
+        )
+    return found
+
+
+def number_in(row: Mapping[str, str], name: str) -> float | None:
+    """The number in a column of a row, None without one."""
+    try:
+        found = float(row.get(name) or "nan")
+    except ValueError:
+        return None
+    return found if math.isfinite(found) else None
+
+
+def _table(done: Any, call: Any) -> dict[str, Any]:
+    found = table_of(done)
+    return {"table": found, "remark": found.remark()}
+
+
 @attrs.frozen(kw_only=True, eq=False)
 class Sweep(Study):
     """Run a parameter study: many studies over ranges of inputs, with one table, main effects and the Pareto
@@ -82,6 +142,15 @@ class Sweep(Study):
     """
 
     name = "sweep"
+    node = Node(
+        "Parameter Study",
+        "many studies of a unit over ranges of its parameters: a table, main effects, Pareto fronts",
+        (("table", "study table", "a row for each study"),),
+        lambda summary: "",
+        label="Parameter Study",
+        read=_table,
+        hidden=("scheduler", "add", "retry"),
+    )
     example = "sweep assets/examples/sweep/sweep.toml --out out/sweep"
     files = {TABLE: "a row for each point: inputs, figures, or why it failed"}
 

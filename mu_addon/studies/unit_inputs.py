@@ -56,6 +56,7 @@ class ProtocolInput(FileInput):
     text: Callable[[Any], str] = protocol_text
     load: Callable[[Path], Any] = lambda path: fem.read_protocol(path)
     descriptions: tuple[Any, ...] = (PROTOCOL,)
+    path: str = "file"
     metavar: str = "CSV"
     target: str = "simulate"
 

@@ -16,6 +16,7 @@ from ..run.study import (
     Dropped,
     Growth,
     Members,
+    Node,
     Over,
     Tell,
     given,
@@ -120,6 +121,12 @@ def _best_in_time(study: UnitStudy, first_ranking: core.Ranking) -> Growth:
     yield first_ranking.best(PATHS_CHECKED)
 
 
+def _remark(summary: Mapping[str, Any]) -> str:
+    angles = {float(p): a for p, a in (summary.get("angle_deg") or {}).items()}
+    words = [f"{angles[p]:.1f}° at {p:g} kPa" for p in (max(angles),)] if angles else []
+    return ", ".join([*filter(None, [summary.get("chosen")]), *words])
+
+
 @attrs.frozen(kw_only=True, eq=False, slots=False)
 class UnitStudy(UnitMotion):
     """A unit's printable solid, its motion without a sensor, and the ranking of sensor paths."""
@@ -148,6 +155,37 @@ class UnitStudy(UnitMotion):
         "sensitivity.vtu": "sensitivity of the deviation to the stiffness of each element, mm (ParaView)",
         "signals.csv": "light signal of each path, and its deviation",
         "paths.csv": "every path of the lattice: length, predicted and, where it was solved, exact deviation",
+    }
+
+    nodes = {
+        "simulate": Node(
+            "Simulate",
+            "the unit's motion under a pressure protocol",
+            (("study", "study", "the motion"),),
+            _remark,
+            label="Simulate",
+            shown=(
+                "unit",
+                "body",
+                "protocol",
+                "mesh",
+                "effects",
+                "obstacles",
+                "times",
+                "self_contact",
+                "self_friction",
+            ),
+        ),
+        "place": Node(
+            "Sensor",
+            "sensor paths, ranked by how much each disturbs the motion",
+            (("study", "study", "motion and ranking"),),
+            _remark,
+            label="Rank Paths",
+            shown=("workers", "stations", "mesh_check", "all_paths", "paths", "checks"),
+            continues="study",
+            passes=("study", "the study passes on without a ranking"),
+        ),
     }
 
     quick: bool = given(OnceInput(descriptions=(QUICK,), target="place"), default=QUICK.default)

@@ -4,66 +4,61 @@ import attrs
 import numpy as np
 import pytest
 
+from mu_addon.design.quantity import described
 from mu_addon.errors import MuError
 from mu_addon.files import write_text
-from mu_addon.graph import Definition, Evaluation, Input, Order, Output
-from mu_addon.graph.definition import setting
+from mu_addon.graph import Definition, Evaluation, Input, Order, Output, Setting
 from mu_addon.graph.records import read_records, record_of, write_records
-from mu_addon.graph.runs import FolderRuns, Stopped
 from mu_addon.run.cache import Cache
-from mu_addon.run.folder import FolderLayout
-from mu_addon.run.usecase import UseCase
+from mu_addon.run.study import Node, Study, setting
+from mu_addon.usecases.graph.runs import FolderRuns, Stopped
 
 from .toys import DEFINITIONS, node, tree
 
 
-@attrs.frozen
-class Job:
-    number: float
+@attrs.frozen(kw_only=True, eq=False)
+class Toy(Study):
+    """A study that notes its runs, fails at 13, answers "bad" at 7, and is stopped at 99."""
 
-    def texts(self):
-        return {"toy.toml": f"# A toy.\nnumber = {self.number!r}\n"}
+    name = "toy"
+    header = "# A toy."
+    streams = True
+    page = ""
+    files = {"out.txt": "done"}
+    runs = []
 
+    number: float = setting(described("number", 0.0, "a number", low=-100, high=100))
 
-class Toy:
-    """A use case that counts its runs, fails at 13, answers "bad" at 7, and is stopped at 99."""
-
-    def __init__(self):
-        self.runs = []
-        layout = FolderLayout("toy.toml", "# A toy.", ("out.txt",))
-        self.use_case = UseCase("toy", layout, None, self.run, lambda summary: [])
-
-    def run(self, job, folder, context):
-        self.runs.append(job.number)
-        context.summary["twice"] = 2 * job.number
+    def work(self, folder, context):
+        self.runs.append(self.number)
+        context.summary["twice"] = 2 * self.number
         with context.progress.stage("toy"):
-            Cache(folder / "cache").put("step", "one", {"x": np.array(job.number)})
-        if job.number == 13:
+            Cache(folder / "cache").put("step", "one", {"x": np.array(self.number)})
+        if self.number == 13:
             raise MuError("thirteen", "there", "take another")
-        if job.number == 99:
+        if self.number == 99:
             raise KeyboardInterrupt
-        context.summary["verdict"] = "bad" if job.number == 7 else "good"
-        if job.number == 7:
+        context.summary["verdict"] = "bad" if self.number == 7 else "good"
+        if self.number == 7:
             raise MuError("seven is bad")
         write_text(folder / "out.txt", "done")
 
 
 @pytest.fixture
 def toy():
-    return Toy()
+    Toy.runs.clear()
+    return Toy
 
 
 def definitions(toy, answers=False):
+    toy.node = Node("Toys", "a toy", (), lambda summary: "", answers=answers)
     made = Definition(
         "toy", "Toy", "Toys", "a run",
         (Input("before", ("toy",), "an earlier one", needed=False),),
         (Output("toy", "toy"), Output("twice", "number")),
-        (setting("number", 0.0, "a number", low=-100, high=100),),
+        (Setting(toy.inputs()["number"].descriptions[0]),),
         order=lambda call: Order(
-            toy.use_case,
-            Job(call.settings["number"]),
-            getattr(call.inputs["before"], "folder", None),
-            answers,
+            toy(number=call.settings["number"]), getattr(call.inputs["before"], "folder", None)
         ),
         read=lambda call, done: {"toy": done, "twice": done.summary["twice"]},
     )  # fmt: skip
@@ -90,7 +85,7 @@ def test_a_run_is_done_once_whatever_node_or_evaluation_wants_it(toy, tmp_path):
     (folder / "summary.json").write_text("{")
     evaluated(both, toy, tmp_path)
     assert toy.runs == [3.0, 3.0]
-    (folder / "toy.toml").write_text("# A toy.\nnumber = 4.0\n")
+    (folder / "toy.toml").write_text("# A toy.\nformat = 1\nnumber = 4.0\n")
     evaluated(both, toy, tmp_path)
     assert toy.runs == [3.0, 3.0, 3.0]
 

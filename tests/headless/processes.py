@@ -15,8 +15,8 @@ from mu_addon.cli.main import main
 from mu_addon.design.parameters import load_preset
 from mu_addon.fem.protocol import Protocol
 from mu_addon.meshing.settings import MeshSettings
+from mu_addon.studies.starting import write_study
 from mu_addon.studies.unit_ranking import UnitStudy
-from mu_addon.studies.use_case import write_study
 
 ROOT = Path(__file__).resolve().parents[2]
 # No measure of speed: what hangs must end some time.

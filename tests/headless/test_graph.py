@@ -144,7 +144,7 @@ def test_bad_files_end_with_a_clear_message(tmp_path, text, words):
 
 def test_a_missing_file_an_unknown_node_and_a_folder_of_another_run_are_told(file, tmp_path):
     assert_clear_failure(
-        here("graph", tmp_path / "no.toml", "--out", tmp_path / "o"), 2, "cannot read the node tree"
+        here("graph", tmp_path / "no.toml", "--out", tmp_path / "o"), 2, "cannot read the graph"
     )
     assert_clear_failure(
         here("graph", file, "--out", tmp_path / "o", "--node", "X"), 2, "there is no node 'X'"

@@ -19,10 +19,7 @@ from mu_addon.grasp import settings as grip
 from mu_addon.meshing import settings as mesh
 from mu_addon.optimization import settings as search
 from mu_addon.placement import settings as path
-from mu_addon.usecases.graph.chain_nodes import chain_nodes
-from mu_addon.usecases.graph.optimize_nodes import optimize_nodes
-from mu_addon.usecases.graph.study_nodes import study_nodes
-from mu_addon.usecases.graph.sweep_nodes import sweep_nodes
+from mu_addon.usecases.graph.definitions import definitions
 from mu_addon.usecases.parameter_study import settings as sweep
 from mu_addon.usecases.simulate_and_place import settings as study
 
@@ -35,20 +32,22 @@ STATED = [
 # The same word for something else, or a zero that is none's default.
 OTHERWISE = {
     "blender/optimize/properties.py": {"points"},  # of a curve that is wanted
+    "blender/sensor/properties.py": {"seconds"},  # of a plot
     "chain/chain.py": {"tip_mass_g"},  # no load
     "chain/joint_learning.py": {"bend_deg"},  # of a joint
     "evidence/parameter.py": {"experiment"},  # that shows an effect
     "evidence/prediction/specimen.py": {"strain"},
     "evidence/prediction/unit_pressure.py": {"orientation_deg"},
     "evidence/unit_body.py": {"self_contact", "orientation_deg", "device"},  # the plain unit, on the CPU
+    "graph/evaluation.py": {"seconds"},  # that a node took
     "measured/experiment.py": {"orientation_deg", "specimen"},
     "optimization/unit_body.py": {"self_contact"},
     "placement/search.py": {"batch"},  # of paths
     "sensing/calibration.py": {"dark"},  # subtracted already
     "studies/unit_motion.py": {"self_contact"},  # of a call, which may be quick
     "usecases/parameter_study/plan.py": {"protocol"},  # a file
-    "usecases/parameter_study/point.py": {"memory_MB"},  # that a study took
-    "usecases/graph/chain_nodes.py": {"protocol"},
+    "usecases/parameter_study/point.py": {"memory_MB", "seconds"},  # that a study took
+    "usecases/graph/studies.py": {"protocol"},
 }
 
 
@@ -155,7 +154,6 @@ def test_an_option_has_default_and_text_of_its_setting(command, d):
 
 
 def test_nodes_have_the_settings_themselves():
-    nodes = {n.kind: n for n in (*study_nodes(), *sweep_nodes(), *optimize_nodes(), *chain_nodes())}
     for kind, d in (
         ("simulate", study.TIMES),
         ("simulate", mesh.SELF_CONTACT),
@@ -168,4 +166,4 @@ def test_nodes_have_the_settings_themselves():
         ("sweep", sweep.MEMORY),
         ("optimize", search.WORKERS),
     ):
-        assert nodes[kind].setting(d.name).description is d
+        assert definitions()[kind].setting(d.name).description is d

@@ -38,8 +38,8 @@ from mu_addon.studies.check import Check
 from mu_addon.studies.grip import Grip
 from mu_addon.studies.homogenize import Homogenize
 from mu_addon.studies.inputs import ResinInput
+from mu_addon.studies.starting import kind_of
 from mu_addon.studies.unit_ranking import UnitStudy
-from mu_addon.usecases.resume import use_case_of
 
 from .test_reading import READERS
 
@@ -246,7 +246,7 @@ def test_a_folder_with_a_damaged_file_is_read_or_refused(name: str, tmp_path: Pa
     reader: Callable[[Path], Any] = read_folder
     if name in JOBS:
         keep_inputs(folder, JOBS[name].texts())
-        reader = use_case_of(folder).read
+        reader = kind_of(folder).read
     else:
         shutil.copytree(DATA / name, folder)
     files = sorted(p for p in folder.iterdir() if p.suffix in (".toml", ".csv"))

@@ -14,8 +14,8 @@ from mu_addon.fem.trajectory import Trajectory
 from mu_addon.fem.unit_materials import materials_of
 from mu_addon.meshing.settings import MeshSettings
 from mu_addon.report.motion_files import write_model_a
+from mu_addon.studies.starting import write_study
 from mu_addon.studies.unit_ranking import UnitStudy
-from mu_addon.studies.use_case import write_study
 from mu_addon.usecases.simulate_and_place import unit_runs
 
 from .made_up import bent

@@ -34,8 +34,8 @@ from mu_addon.sensing.framing import info_frame, sample_frame
 from mu_addon.sensing.optics import Optics
 from mu_addon.sensing.recording import read_recording
 from mu_addon.sensing.sources import EndOfStream
+from mu_addon.studies.starting import start
 from mu_addon.studies.unit_ranking import UnitStudy
-from mu_addon.studies.use_case import use_case
 from mu_addon.usecases.parameter_study.point import Outcome, Task
 from mu_addon.usecases.simulate_and_place import light, motion
 
@@ -261,7 +261,7 @@ def answered(task: Task) -> Outcome:
 
 def started(job: UnitStudy) -> Run:
     """A run of a study of a unit."""
-    return lambda folder, context: use_case("place").start(job, folder, context)
+    return lambda folder, context: start(job, folder, context)
 
 
 def simulation(monkeypatch: pytest.MonkeyPatch) -> Run:

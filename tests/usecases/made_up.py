@@ -77,7 +77,7 @@ class Waveguides:
 def place(folder, job):
     """Run a study in a folder, in this process; its motion, map and lattice's paths are made up."""
     from mu_addon.placement.sensitivity_map import Influence, loaded
-    from mu_addon.studies.use_case import use_case
+    from mu_addon.studies.starting import start
     from mu_addon.usecases.simulate_and_place import graph_search
 
     def influence(model, materials, trajectory, monitor, pressures, sides):
@@ -107,5 +107,5 @@ def place(folder, job):
         messages = []
         with run_to_end(Progress([messages.append])) as context:
             context.wants_report = False
-            use_case("place").start(attrs.evolve(job, workers=1), folder, context)
+            start(attrs.evolve(job, workers=1), folder, context)
         assert context.status == 0, messages[-1]

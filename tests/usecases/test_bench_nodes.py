@@ -11,14 +11,15 @@ import pytest
 from mu_addon.cli.main import main
 from mu_addon.errors import InputError
 from mu_addon.graph import Evaluation, Node, NodeTree, Source
-from mu_addon.graph.runs import FolderRuns
 from mu_addon.run.context import run_to_end
 from mu_addon.run.progress import Progress
 from mu_addon.sensing.recording import Recorder
 from mu_addon.sensing.samples import Layout, Samples
 from mu_addon.studies.measure import Measure
+from mu_addon.studies.record import Record
+from mu_addon.studies.starting import start
 from mu_addon.usecases.graph.definitions import definitions
-from mu_addon.usecases.sensor import record
+from mu_addon.usecases.graph.runs import FolderRuns
 
 
 def recorded(folder, sweeps=4, seed=0, period_s=10.0):
@@ -133,23 +134,23 @@ def test_a_recording_is_a_run_of_its_own_take(tmp_path):
 
 
 def test_a_recording_that_is_stopped_is_none_and_the_next_is_beside_it(tmp_path):
-    job = record.Job(simulated=True, seconds=600.0)
+    job = Record(simulated=True, seconds=600.0)
     with run_to_end(Progress([])) as context:
         threading.Timer(1.0, os.kill, (os.getpid(), signal.SIGTERM)).start()
-        record.USE_CASE.start(job, tmp_path / "run", context)
+        start(job, tmp_path / "run", context)
     assert context.status == 143
     assert json.loads((tmp_path / "run" / "summary.json").read_text())["status"] == "cancelled"
     assert (tmp_path / "run" / "recording-1" / "index.ndjson").is_file()
     with run_to_end(Progress([])) as context:
-        record.USE_CASE.start(record.Job(simulated=True, seconds=0.3), tmp_path / "other", context)
+        start(Record(simulated=True, seconds=0.3), tmp_path / "other", context)
     assert context.status == 0
-    assert record.read_job(tmp_path / "run") == job
+    assert Record.read(tmp_path / "run").texts() == job.texts()
 
 
 @pytest.mark.parametrize(
     ("given", "words"),
-    [({"seconds": -1.0}, "not a valid duration"), ({"baud": 0}, "baud = 0 is out of bounds")],
+    [({"seconds": -1.0}, "seconds = -1 s is out of bounds"), ({"baud": 0}, "baud = 0 is out of bounds")],
 )
 def test_settings_that_cannot_be_are_refused(given, words):
     with pytest.raises(InputError, match=words):
-        record.Job(**given)
+        Record(**given)

@@ -12,7 +12,7 @@ from mu_addon.chain.unit_between_plates import PlateBody
 from mu_addon.cli.main import main
 from mu_addon.errors import InputError
 from mu_addon.studies.chain import Chain
-from mu_addon.usecases.resume import use_case_of
+from mu_addon.studies.starting import kind_of
 
 from ..evidence.hollow_finger import finger
 
@@ -50,7 +50,7 @@ def test_the_example_reads_and_its_folder_reads_alike(tmp_path):
     for name, text in job.texts().items():
         (tmp_path / name).write_text(text, encoding="utf-8")
     assert Chain.read(tmp_path).texts() == job.texts()
-    assert use_case_of(tmp_path).name == "chain"
+    assert kind_of(tmp_path) is Chain
 
 
 def test_equal_units_share_the_range_of_their_pressures(folder):

@@ -18,7 +18,7 @@ from mu_addon.measured.kinds import NOISE
 from mu_addon.run.context import run_to_end
 from mu_addon.run.progress import Progress
 from mu_addon.studies.design_experiments import DesignExperiments, NoiseInput, plan
-from mu_addon.studies.use_case import use_case
+from mu_addon.studies.starting import start
 from tests.evidence import analytic
 
 from .diagnosis_data import weighed_blocks
@@ -77,7 +77,7 @@ def test_it_leaves_a_table_and_a_report(tmp_path):
     with run_to_end(progress) as context:
         folder = weighed_blocks(tmp_path / "data", 0.0)
         study = DesignExperiments(data=read_folder(folder))
-        use_case("design-experiments").start(study, tmp_path / "out", context)
+        start(study, tmp_path / "out", context)
     assert context.status == 0
     # Weighed, the two are no longer one.
     assert not {"overcure", "skin_cure"} <= {n for pair in context.summary["alike"] for n in pair[:2]}
@@ -101,7 +101,7 @@ def test_a_unit_is_simulated_once_and_what_that_leaves_out_is_noted(tmp_path, mo
         measured = read_folder(asset_root() / "examples" / "paper-bending")
         whole = tuple(e for e in measured.experiments if e.scale == 1.0)
         study = DesignExperiments(data=attrs.evolve(measured, experiments=whole), self_contact=False)
-        use_case("design-experiments").start(study, tmp_path / "out", context)
+        start(study, tmp_path / "out", context)
     assert context.status == 0
     assert [m["what"] for m in messages if m["type"] == "warning"] == ["contact with 2 N is left out"]
     assert "<p>contact with 2 N is left out</p>" in (tmp_path / "out" / "report.html").read_text()

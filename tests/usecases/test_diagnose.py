@@ -26,10 +26,10 @@ from mu_addon.measured import read_folder
 from mu_addon.run.context import run_to_end
 from mu_addon.run.folder import keep_inputs
 from mu_addon.run.progress import Progress
-from mu_addon.run.usecase import UseCase
+from mu_addon.studies import starting
 from mu_addon.studies.design_experiments import DesignExperiments
 from mu_addon.studies.diagnose import Diagnose
-from mu_addon.studies.use_case import use_case
+from mu_addon.studies.starting import start
 from mu_addon.usecases.diagnose import judged_data
 from mu_addon.usecases.diagnose.words import alternatives, what_to_do
 from mu_addon.usecases.graph.definitions import definitions
@@ -51,7 +51,7 @@ def run(folder, out, unit=None, **options):
     progress = Progress([messages.append])
     with run_to_end(progress) as context:
         study = Diagnose(data=read_folder(folder), unit=unit, **options).complete()
-        use_case("diagnose").start(study, out, context)
+        start(study, out, context)
     return context, messages
 
 
@@ -213,7 +213,7 @@ def test_every_face_keeps_walls_apart(tmp_path, monkeypatch):
     folder = ROOT / "assets" / "examples" / "paper-bending"
     measured = read_folder(folder)
     started = [Diagnose(data=measured), DesignExperiments(data=measured)]
-    monkeypatch.setattr(UseCase, "start", lambda _, job, *__: started.append(job))
+    monkeypatch.setattr(starting, "start", lambda job, *_: started.append(job))
     for command in ("diagnose", "design-experiments"):
         main([command, str(folder), "--out", str(tmp_path / "out")])
     assert all(job.self_contact for job in started)

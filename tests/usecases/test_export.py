@@ -33,7 +33,7 @@ from mu_addon.run.progress import Progress
 from mu_addon.studies.export import Export, deformed_in
 from mu_addon.studies.inputs import NodePath, path_of
 from mu_addon.studies.specimens import Specimens
-from mu_addon.studies.use_case import use_case
+from mu_addon.studies.starting import start
 
 from .bent_motion import ANGLES, PRESSURES, bent, write_bent_motion
 
@@ -44,7 +44,7 @@ RESIN = load_material("elastic-50a-v1")
 def run(job, folder):
     messages = []
     with run_to_end(Progress([messages.append])) as context:
-        use_case(job.name).start(job, folder, context)
+        start(job, folder, context)
     return context, messages
 
 

@@ -14,7 +14,7 @@ from mu_addon.measured import read_folder
 from mu_addon.run.context import run_to_end
 from mu_addon.run.progress import Progress
 from mu_addon.studies.fit_material import FitMaterial
-from mu_addon.studies.use_case import use_case
+from mu_addon.studies.starting import start
 
 DATA = Path(__file__).parent.parent / "data"
 
@@ -27,7 +27,7 @@ def run(folder, out, *arguments, **options):
     messages = []
     progress = Progress([messages.append])
     with run_to_end(progress) as context:
-        use_case("fit-material").start(job(folder, *arguments, **options), out, context)
+        start(job(folder, *arguments, **options), out, context)
     return context, messages
 
 

@@ -14,11 +14,11 @@ from mu_addon.errors import InputError
 from mu_addon.graph import Evaluation, Kept, Node, NodeTree, Source, faults, read_tree, tree_text
 from mu_addon.run.context import run_to_end
 from mu_addon.run.progress import Progress
+from mu_addon.studies.graph import Graph
+from mu_addon.studies.starting import start
 from mu_addon.usecases.graph import design_nodes
 from mu_addon.usecases.graph.comparison import compare
 from mu_addon.usecases.graph.definitions import definitions
-from mu_addon.usecases.graph.job import Job, job_of_file, read_job
-from mu_addon.usecases.graph.run import USE_CASE
 from mu_addon.usecases.graph.templates import steps_of, template, template_names
 
 
@@ -178,14 +178,14 @@ def test_a_tree_in_its_folder_runs_again_with_its_wishes_and_a_fault_stops_it_be
     tree = NodeTree(
         "t", {"U": Node("unit"), "W": Node("set_parameter", links={"unit": (Source("U", "unit"),)})}
     )
-    job = Job(tree, ("U",))
+    job = Graph(tree=tree, wanted=("U",))
     (tmp_path / "graph.toml").write_text(job.texts()["graph.toml"], encoding="utf-8")
-    assert read_job(tmp_path) == job
+    assert Graph.read(tmp_path).texts() == job.texts()
     with pytest.raises(InputError, match="there is no node 'X'"):
-        Job(tree, ("X",))
-    bad = Job(changed(tree, "W", parameter="chambers.nothing"))
+        Graph(tree=tree, wanted=("X",))
+    bad = Graph(tree=changed(tree, "W", parameter="chambers.nothing"))
     with run_to_end(Progress()) as context:
-        USE_CASE.start(bad, tmp_path / "out", context)
+        start(bad, tmp_path / "out", context)
     assert context.status == 2
     assert not (tmp_path / "out" / "nodes").exists()
 
@@ -194,7 +194,7 @@ def test_paths_in_a_file_are_beside_it(tmp_path):
     (tmp_path / "mine.toml").write_text("format = 1\nscale = 1.5\n", encoding="utf-8")
     text = tree_text(NodeTree("t", {"U": Node("unit", {"file": "mine.toml"})}))
     (tmp_path / "tree.toml").write_text(text, encoding="utf-8")
-    job = job_of_file(tmp_path / "tree.toml")
+    job = Graph.read_file(tmp_path / "tree.toml")
     assert evaluated(job.tree).outputs["U"]["unit"].unit.scale == 1.5
     # The content counts, not the name alone.
     kept = Kept()
@@ -215,7 +215,7 @@ def test_a_run_leaves_states_a_table_and_a_report_and_one_failure_does_not_keep_
     }
     messages = []
     with run_to_end(Progress([messages.append])) as context:
-        USE_CASE.start(Job(NodeTree("walls", nodes)), tmp_path, context)
+        start(Graph(tree=NodeTree("walls", nodes)), tmp_path, context)
     assert context.status == 2
     assert "node 'thick'" in messages[-1]["where"]
     states = json.loads((tmp_path / "nodes.json").read_text())["nodes"]
@@ -260,7 +260,7 @@ def test_obstacles_are_what_a_simulation_may_touch(tmp_path):
 
     class Orders:
         def find(self, order):
-            found.append(order.job)
+            found.append(order.study)
             raise InputError("this far", "", "")
 
     found = []

@@ -16,7 +16,7 @@ from mu_addon.measured import read_folder
 from mu_addon.run.context import RunContext
 from mu_addon.run.progress import Progress
 from mu_addon.studies.import_ import Import
-from mu_addon.studies.use_case import use_case
+from mu_addon.studies.starting import start
 
 from ..lab_files import exports
 from ..lab_files.test_cells import workbook
@@ -35,7 +35,7 @@ def written(tmp_path, text, name="one.csv", encoding="utf-8"):
 def imported(tmp_path, paths, answers, ask=None):
     folder, context = tmp_path / "measured", RunContext(Progress())
     try:
-        use_case("import").start(Import(paths=tuple(paths), answers=answers, ask=ask), folder, context)
+        start(Import(paths=tuple(paths), answers=answers, ask=ask), folder, context)
     finally:
         context.unlock()
     return read_folder(folder)

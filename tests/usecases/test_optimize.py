@@ -16,7 +16,7 @@ from mu_addon.optimization.words import changes, outcome, reasons, verdict
 from mu_addon.run.context import RunContext
 from mu_addon.run.progress import Progress
 from mu_addon.studies.optimize import NO_UNIT, Optimize, mechanics_of
-from mu_addon.studies.use_case import use_case
+from mu_addon.studies.starting import start
 
 TEXT = """
 format = 1
@@ -68,7 +68,7 @@ def simulated(monkeypatch):
 def started(study, folder, report=True):
     context = RunContext(Progress([]))
     context.wants_report = report
-    use_case("optimize").start(study, folder, context)
+    start(study, folder, context)
     context.unlock()
     return context.summary, (folder / "designs.csv").read_text()
 

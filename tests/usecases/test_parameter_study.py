@@ -23,8 +23,8 @@ from mu_addon.run.child import RUNNING, Child
 from mu_addon.run.context import run_to_end
 from mu_addon.run.progress import Progress
 from mu_addon.run.study import stage
+from mu_addon.studies.starting import start
 from mu_addon.studies.sweep import Sweep
-from mu_addon.studies.use_case import use_case
 from mu_addon.usecases.parameter_study import point as point_module
 from mu_addon.usecases.parameter_study.plan import parse_plan, read_plan
 from mu_addon.usecases.parameter_study.point import Outcome, Task, run_point
@@ -74,7 +74,7 @@ def swept(text, folder, add=0, status=0, **options):
     asked.clear()
     with run_to_end(Progress([messages.append])) as context:
         plan = parse_plan(text, folder).continued(folder / "sweep.toml", add)
-        use_case("sweep").start(Sweep(plan=plan, workers=1, **options), folder, context)
+        start(Sweep(plan=plan, workers=1, **options), folder, context)
     assert context.status == status, messages[-1]
     return list(csv.DictReader((folder / "points.csv").open(newline=""))), messages
 
@@ -361,7 +361,7 @@ def test_a_lost_worker_and_a_restarted_scheduler_lose_no_point(farm, tmp_path):
 
     plan = parse_plan(text, tmp_path)
     with run_to_end(Progress([Trouble()])) as context:
-        use_case("sweep").start(SlowSweep(plan=plan, scheduler=farm.address), folder, context)
+        start(SlowSweep(plan=plan, scheduler=farm.address), folder, context)
     assert context.status == 0, messages[-1]
     assert lost.poll() is not None
     assert first.poll() is not None
@@ -378,7 +378,7 @@ def test_a_scheduler_that_is_not_there_is_told(tmp_path, monkeypatch):
     messages = []
     with run_to_end(Progress([messages.append])) as context:
         job = Sweep(plan=parse_plan(TEXT, tmp_path), scheduler=f"tcp://127.0.0.1:{free_port()}")
-        use_case("sweep").start(job, tmp_path / "out", context)
+        start(job, tmp_path / "out", context)
     assert context.status == 1
     assert "no scheduler answers" in messages[-1]["what"]
     assert "dask scheduler" in messages[-1]["what_to_do"]

@@ -1,4 +1,4 @@
-"""A folder's inputs are enough to run any use case again: read back, they are the job that wrote them."""
+"""A folder's inputs are enough to run any study again: read back, they are the job that wrote them."""
 
 import shutil
 from pathlib import Path
@@ -28,20 +28,20 @@ from mu_addon.studies.design_experiments import DesignExperiments
 from mu_addon.studies.diagnose import Diagnose
 from mu_addon.studies.export import Export, TakeOff
 from mu_addon.studies.fit_material import FitMaterial
+from mu_addon.studies.graph import Graph
 from mu_addon.studies.grip import Grip
 from mu_addon.studies.homogenize import Homogenize
 from mu_addon.studies.inputs import NodePath, ResinInput
+from mu_addon.studies.live import Live
 from mu_addon.studies.optimize import Optimize
+from mu_addon.studies.prepare import Prepare
+from mu_addon.studies.record import Record
 from mu_addon.studies.specimens import Specimens
+from mu_addon.studies.starting import kind_of, resume
 from mu_addon.studies.sweep import Sweep
 from mu_addon.studies.unit_ranking import UnitStudy
-from mu_addon.usecases import prepare
-from mu_addon.usecases.graph import job as graph
 from mu_addon.usecases.graph.templates import template
-from mu_addon.usecases.live_bending import requests as live_bending
 from mu_addon.usecases.parameter_study.plan import parse_plan
-from mu_addon.usecases.resume import MODULES, resume, use_case_of
-from mu_addon.usecases.sensor import record
 
 DATA = Path(__file__).parent.parent / "data"
 UNIT = Unit(name='a "quoted" unit', chambers=Chambers(wall_mm=0.95))
@@ -52,7 +52,7 @@ def lattice(unit, resin, **more):
 
 
 def jobs(folder):
-    """A job of every use case whose inputs are its own, none with what it has by default."""
+    """A job of every study whose inputs are its own, none with what it has by default."""
     protocol = Protocol([0.0, 1.0, 2.0], [0.0, 0.1 + 0.2, -20.0])
     resin = load_material("elastic-50a-v1")
     part = folder / "part.stl"
@@ -98,8 +98,8 @@ def jobs(folder):
     yield Export(unit=UNIT, path=bent, vent_along=(0.0, 0.1, -1.0))
     yield Specimens(unit=UNIT, resin=resin, printer=load_printer())
     yield Specimens(unit=UNIT, resin=None, printer=load_printer())
-    yield prepare.Job("solid", {"path": "alpha1", "quality": "export", "stl": ""}, UNIT)
-    yield live_bending.Job()
+    yield Prepare(result="solid", of={"path": "alpha1", "quality": "export", "stl": ""}, unit=UNIT)
+    yield Live()
     yield lattice(UNIT, "elastic-50a-v1", cells=2, friction="stick", strain=0.25, refine=2 / 3)
     yield lattice(load_preset("mu-1.5x"), None, friction="none")
     hand = load_gripper("gripper")
@@ -111,8 +111,8 @@ def jobs(folder):
     yield Sweep(plan=attrs.evolve(parse_plan(sweep, folder), counts=(4, 6)), workers=2)
     yield Chain.read_file(asset_root() / "examples/trunk/chain.toml")
     yield Optimize(design=read_design(asset_root() / "examples/graded-finger/design.toml"))
-    yield record.Job(simulated=True, seconds=1 / 3, take=2)
-    yield graph.Job(template("data-to-cause"), ("Diagnose",), node_reports=True)
+    yield Record(simulated=True, seconds=1 / 3, take=2)
+    yield Graph(tree=template("data-to-cause"), wanted=("Diagnose",), node_reports=True)
 
 
 def test_every_job_is_read_back_from_its_folder(tmp_path):
@@ -120,13 +120,13 @@ def test_every_job_is_read_back_from_its_folder(tmp_path):
     for number, job in enumerate(jobs(tmp_path)):
         folder = tmp_path / f"{number}"
         keep_inputs(folder, job.texts())
-        found = use_case_of(folder)
+        found = kind_of(folder)
         assert found.read(folder).texts() == job.texts()
-        assert found.layout.is_of(folder)
-        seen.add(found.layout.inputs)
+        assert found.layout().is_of(folder)
+        seen.add(found.layout().inputs)
     # These two are made from recordings: tests/usecases/test_calibrate.py, test_bench_nodes.py.
     own = {study(name).layout().inputs for name in STUDIES if not study(name).joins}
-    assert seen == {*MODULES, *own} - {"calibrate.toml", "measure.toml"}
+    assert seen == own - {"calibrate.toml", "measure.toml"}
 
 
 def test_measured_data_that_are_gone_or_others_are_named(tmp_path):

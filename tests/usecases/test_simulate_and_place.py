@@ -18,8 +18,8 @@ from mu_addon.meshing.settings import MeshSettings
 from mu_addon.report.motion_files import read_motion
 from mu_addon.run.context import RunContext
 from mu_addon.run.progress import Progress
+from mu_addon.studies.starting import start
 from mu_addon.studies.unit_ranking import UnitStudy
-from mu_addon.studies.use_case import use_case
 from mu_addon.usecases.simulate_and_place.expected import BYTES, BYTES_A_NODE, expected_nodes
 from tests.design.kinds import custom, octet
 
@@ -82,7 +82,7 @@ def test_its_motion_is_a_table_over_time(placed):
 
 def test_its_solid_is_said_in_mm_ml_and_g(tmp_path):
     context = RunContext(Progress([]))
-    work = use_case("design").start(attrs.evolve(JOB, stages=("design",)), tmp_path, context)
+    work = start(attrs.evolve(JOB, stages=("design",)), tmp_path, context)
     found = json.loads(json.dumps(plain(context.summary["solid"])))
     context.unlock()
     assert found["size_mm"][2] == pytest.approx(JOB.unit.dimensions.height, abs=10.0)

@@ -13,9 +13,9 @@ from mu_addon.fem.protocol import Protocol
 from mu_addon.meshing.settings import MeshSettings
 from mu_addon.run.folder import keep_inputs
 from mu_addon.run.lock import FolderLock, InUseError
+from mu_addon.studies.starting import write_study
 from mu_addon.studies.unit_motion import STAGES
 from mu_addon.studies.unit_ranking import UnitStudy
-from mu_addon.studies.use_case import write_study
 
 JOB = UnitStudy(
     unit=load_preset("mu-0.75x"),

@@ -37,6 +37,10 @@ def study(*ranges, unit="mu-0.75x", **settings):
     return call("sweep", inputs, **settings)
 
 
+def sweep_order(call):
+    return definitions()["sweep"].order(call)
+
+
 def test_names_and_choices_are_those_of_the_parameter_study():
     parameters = next(s for s in definitions()["range"].settings if s.name == "parameter")
     assert set(parameters.description.choices) <= set(variable.variable_names())
@@ -56,7 +60,7 @@ mesh = { refine = 0.5 }
 """
     walls = range_of(low=0.8, high=1.0, steps=3)
     counts = range_of(parameter="chambers.count", values="4 6")
-    made = sweep_orders.sweep_order(study(walls, counts, times=5)).job.plan
+    made = sweep_order(study(walls, counts, times=5)).study.plan
 
     wanted = parse_plan(text, Path("/"))
     texts = Sweep(plan=made).texts()
@@ -69,16 +73,13 @@ mesh = { refine = 0.5 }
 
 
 def test_walls_of_units_keep_apart():
-    made = sweep_orders.sweep_order(study(range_of())).job.plan
+    made = sweep_order(study(range_of())).study.plan
     assert made.inputs.tables["simulate"]["self_contact"]
 
 
 def test_how_many_studies_at_a_time_decides_no_key_and_a_step_more_does():
     walls = range_of()
-    keys = [
-        sweep_orders.sweep_order(study(r, workers=n)).key
-        for r, n in ((walls, 1), (walls, 7), (range_of(steps=4), 1))
-    ]
+    keys = [sweep_order(study(r, workers=n)).key for r, n in ((walls, 1), (walls, 7), (range_of(steps=4), 1))]
     assert keys[0] == keys[1] != keys[2]
 
 
@@ -98,7 +99,7 @@ def test_ranges_that_are_none_are_refused(settings, words):
 
 def test_one_parameter_in_two_ranges_is_refused():
     with pytest.raises(InputError, match=r"chambers\.wall_mm is varied by two"):
-        sweep_orders.sweep_order(study(range_of(), range_of(values="0.9")))
+        sweep_order(study(range_of(), range_of(values="0.9")))
 
 
 def table(tmp_path, rows, *ranges):
@@ -106,7 +107,8 @@ def table(tmp_path, rows, *ranges):
         writer = csv.DictWriter(stream, ["point", "status", "mass_g", "angle_range_deg", "seconds", "what"])
         writer.writeheader()
         writer.writerows(rows)
-    return sweep_orders.table_of(study(*ranges), Finished(tmp_path, {}))["table"]
+    order = sweep_order(study(*ranges))
+    return definitions()["sweep"].read(study(*ranges), Finished(tmp_path, {}, order.study))["table"]
 
 
 def test_the_best_study_gives_its_unit_whatever_failed_beside_it(tmp_path):
@@ -142,7 +144,7 @@ def test_a_study_that_starts_at_blenders_entry_gives_the_same_figures(monkeypatc
 
     from mu_addon.blender.jobs import child_main
 
-    plan = sweep_orders.sweep_order(study(range_of(), refine=0.4, times=2, stages="design")).job.plan
+    plan = sweep_order(study(range_of(), refine=0.4, times=2, stages="design")).study.plan
     task = attrs.evolve(plan.task(1), memory_MB=2000, minutes=5.0)
     here = run_point(task)
     monkeypatch.setenv("MU_ENTRY", child_main.__file__)

@@ -10,8 +10,8 @@ from mu_addon.design.parameters import load_preset
 from mu_addon.errors import InputError
 from mu_addon.meshing.settings import MeshSettings
 from mu_addon.run.lock import FolderLock, InUseError
+from mu_addon.studies.starting import write_study
 from mu_addon.studies.unit_ranking import UnitStudy
-from mu_addon.studies.use_case import write_study
 from mu_addon.usecases.simulate_and_place import unit_runs
 from mu_addon.usecases.simulate_and_place.comparison import compare
 

@@ -18,7 +18,7 @@ from mu_addon.meshing.settings import MeshSettings
 from mu_addon.run.context import run_to_end
 from mu_addon.run.progress import Progress
 from mu_addon.studies.diagnose import Diagnose
-from mu_addon.studies.use_case import use_case
+from mu_addon.studies.starting import start
 from mu_addon.usecases.diagnose.unknown import read_unknown
 
 PAPER = Path(__file__).parents[2] / "assets" / "examples" / "paper-bending"
@@ -77,7 +77,7 @@ def test_a_shape_that_nobody_measured_is_found_and_no_cause_named(tmp_path, clos
     measured = read_folder(written(tmp_path / "data"))
     with run_to_end(Progress()) as context:
         study = Diagnose(data=measured, unit=UNIT, settings=settings, unknown=unknown)
-        use_case("diagnose").start(study, tmp_path / "out", context)
+        start(study, tmp_path / "out", context)
     assert context.summary["verdict"] == "none"
     found = context.summary["unknown"]
     best = found["fitted"][0]
@@ -163,7 +163,7 @@ def test_no_cause_is_named_while_dimensions_are_unknown(tmp_path, closed_form):
     unknown = read_unknown(TEXT, "unknown.toml", UNIT)
     with run_to_end(Progress()) as context:
         study = Diagnose(data=read_folder(folder), unit=UNIT, settings=settings, unknown=unknown)
-        use_case("diagnose").start(study, tmp_path / "out", context)
+        start(study, tmp_path / "out", context)
     assert context.summary["verdict"] == "unexplained"
     remarks = json.loads((tmp_path / "out" / "summary.json").read_text())["remarks"]
     assert any("no cause is named while dimensions are unknown" in r for r in remarks)

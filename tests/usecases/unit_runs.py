@@ -6,7 +6,7 @@ import attrs
 
 from mu_addon.run.context import RunContext, run_to_end
 from mu_addon.run.progress import Progress
-from mu_addon.studies.use_case import use_case
+from mu_addon.studies.starting import start
 
 
 def ran(job, folder, status=0):
@@ -14,7 +14,7 @@ def ran(job, folder, status=0):
     messages = []
     with run_to_end(Progress([messages.append])) as context:
         context.wants_report = False
-        use_case("place").start(attrs.evolve(job, workers=1), folder, context)
+        start(attrs.evolve(job, workers=1), folder, context)
     assert context.status == status, messages[-1]
     path = folder / "summary.json"
     return json.loads(path.read_text()) if path.is_file() else {}, messages
@@ -24,6 +24,6 @@ def executed(job, folder):
     """A study at its end, an `Execution`, and the context of its run."""
     context = RunContext(Progress([]), wants_report=False)
     try:
-        return use_case("place").start(attrs.evolve(job, workers=1), folder, context), context
+        return start(attrs.evolve(job, workers=1), folder, context), context
     finally:
         context.unlock()

@@ -27,7 +27,7 @@ from mu_addon.measured import Experiment, read_folder
 from mu_addon.run.context import run_to_end
 from mu_addon.run.progress import Progress, terminal
 from mu_addon.studies.diagnose import Diagnose
-from mu_addon.studies.use_case import use_case
+from mu_addon.studies.starting import start
 
 from .recording import write
 from .sets import Order, made, noise_of
@@ -168,7 +168,7 @@ def verdict_on(folder: Path, unit: Path, out: Path) -> dict[str, Any]:
     """The program's verdict on a folder, in one folder for all sets: its simulations are kept there."""
     with run_to_end(Progress([terminal(sys.stderr)])) as context:
         study = Diagnose(data=read_folder(folder), unit=read_unit(unit)).complete()
-        use_case("diagnose").start(study, out, context)
+        start(study, out, context)
     if context.status:
         raise SystemExit(context.status)
     return dict(json.loads((out / "verdict.json").read_text()))

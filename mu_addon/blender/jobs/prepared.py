@@ -15,7 +15,6 @@ import bpy
 
 from ...files import read_npz, write_npz
 from ...run.child import DONE
-from ...run.folder import write_run
 from ..shared import viewports
 from ..shared.operators import NotReady, in_script
 from ..shared.registration import at_end, connected
@@ -31,7 +30,7 @@ def at_once() -> bool:
 class NotPrepared(NotReady):
     """Raised where a slow part is lacking; `begin` starts the process that computes it.
 
-    job: of `usecases.prepare`, run in `folder`; keep: called with the arrays, or None and the error; points
+    job: of `studies.prepare`, run in `folder`; keep: called with the arrays, or None and the error; points
     (p, 3): points to embed, in mm; repeats: True if the operator is called again.
     """
 
@@ -52,9 +51,10 @@ class NotPrepared(NotReady):
         _waiting[kind.key(root)] = self, [again] * self.repeats
 
     def _write(self, folder: Path) -> None:
-        from ...usecases.prepare import LAYOUT, POINTS, RESULT
+        from ...studies.prepare import POINTS, RESULT
+        from ...studies.starting import write_study
 
-        write_run(folder, LAYOUT, self.job.texts())
+        write_study(self.job, folder)
         (folder / RESULT).unlink(missing_ok=True)
         if self.points is not None:
             write_npz(folder / POINTS, {"points": self.points}, packed=False)
@@ -71,7 +71,7 @@ def _kind(wanted: NotPrepared) -> JobKind:
 
 @connected(JOB_ENDED)
 def _ended(key: str) -> None:
-    from ...usecases.prepare import RESULT
+    from ...studies.prepare import RESULT
 
     wanted, then = _waiting.pop(key, (None, []))
     child = child_of(key)

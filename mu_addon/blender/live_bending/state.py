@@ -1,6 +1,6 @@
 """A unit bent while it is designed: the process that finds its shapes, and the objects that show them.
 
-The process (`usecases.live_bending`) waits between changes. A timer sends a request once the parameters rest,
+The process (`studies.live`) waits between changes. A timer sends a request once the parameters rest,
 and shows the answer in the unit's place. It ends while a job that takes the machine runs.
 """
 
@@ -21,7 +21,6 @@ from ...placement.sampling import polynomials
 from ...reading import file_bytes, parse_json
 from ...report.motion_files import Motion, read_motion
 from ...run.child import RUNNING, Child
-from ...run.folder import write_run
 from ..jobs import start_child
 from ..results import bodies
 from ..shared import displays, viewports
@@ -255,12 +254,14 @@ def _follow(root: Any, live: Live) -> None:
 
 def _ask(root: Any, live: Live) -> None:
     # Imported late, with the solver's packages.
+    from ...studies.live import Live
+    from ...studies.starting import write_study
     from ...usecases.live_bending import requests
 
     study = simulation.job_of(root)
     if live.child is None:
         shutil.rmtree(live.folder, ignore_errors=True)
-        write_run(live.folder, requests.LAYOUT, requests.Job().texts())
+        write_study(Live(), live.folder)
     live.number += 1
     kPa, fields = root.mu_live.pressure_kPa, root.mu_live.colour != PLAIN
     requests.ask(live.folder, live.number, study, kPa, fields)

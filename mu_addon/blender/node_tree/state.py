@@ -17,13 +17,13 @@ import bpy
 
 from ...errors import InputError, MuError
 from ...graph.evaluation import FAILED, Evaluation, Kept, Record, State
+from ...graph.records import FOLDER, read_records
 from ...graph.records import NAME as RECORDS
-from ...graph.records import read_records
-from ...graph.runs import FOLDER
 from ...graph.tree import Source
-from ...run.folder import write_run
+from ...graph.tree_file import file_name
+from ...studies.graph import Graph
+from ...studies.starting import write_study
 from ...usecases.graph.definitions import definitions
-from ...usecases.graph.job import LAYOUT, Job, file_name
 from ...usecases.graph.plan import plan_of
 from ...usecases.graph.templates import steps_of
 from ..jobs.start_child import INTERVAL_S, JOB_ENDED, JobKind
@@ -201,9 +201,9 @@ def redraw() -> None:
                 area.tag_redraw()
 
 
-def job_of(tree: Any, wanted: tuple[str, ...] = ()) -> Job:
+def job_of(tree: Any, wanted: tuple[str, ...] = ()) -> Graph:
     """Job that evaluates a tree; raises InputError for a fault of a node."""
-    job = Job(conversion.to_tree(tree), wanted, tree.mu_reports)
+    job = Graph(tree=conversion.to_tree(tree), wanted=wanted, node_reports=tree.mu_reports)
     job.require_sound()
     return job
 
@@ -216,7 +216,7 @@ def start(tree: Any, wanted: tuple[str, ...] = ()) -> Any:
         tree.mu_folder = relative(folder)
     expected = plan_of(job.tree, _states.get(tree.session_uid, {}), wanted, folder)
     kind = attrs.evolve(RUN, plan_of=lambda _: expected)
-    child = kind.start(tree, folder, lambda place: write_run(place, LAYOUT, job.texts()))
+    child = kind.start(tree, folder, lambda place: write_study(job, place))
     _redraw_running.soon(INTERVAL_S)
     return child
 

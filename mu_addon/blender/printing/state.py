@@ -176,11 +176,11 @@ def solid_of(root: Any, unit: Unit, quality: str = "interactive", stl: str = "")
     if prepared.at_once() or (not stl and stack.STACK.has("solid", given)):
         solid: Solid = stack.STACK.value("solid", given)
         return solid
-    from ...usecases.prepare import Job, solid_of
+    from ...studies.prepare import Prepare, solid_of
 
     window = chosen_window(root, unit)
     of = {"path": window.name if window else "", "quality": quality, "stl": stl}
-    job = Job("solid", of, unit, given.body)
+    job = Prepare(result="solid", of=of, unit=unit, body=given.body)
 
     def keep(arrays: Any, trouble: str) -> None:
         if arrays is not None and not stl:

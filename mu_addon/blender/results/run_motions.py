@@ -66,7 +66,7 @@ def _unknown(share: float) -> str:
 
 def _wanted(root: Any, motion: Motion, name: str, other: Motion, cut: bool) -> prepared.NotPrepared:
     """Both regions' distances, made in another process."""
-    from ...usecases.prepare import Job
+    from ...studies.prepare import Prepare
 
     one, two = (m.folder.parent for m in (motion, other))
 
@@ -78,17 +78,17 @@ def _wanted(root: Any, motion: Motion, name: str, other: Motion, cut: bool) -> p
 
     of = {"one": str(one), "other": str(two), "name": name, "cut": cut}
     folder = studies.folder_of(root) / "difference"
-    return prepared.NotPrepared(root, "difference of runs", folder, Job("difference", of), keep)
+    return prepared.NotPrepared(root, "difference of runs", folder, Prepare(result="difference", of=of), keep)
 
 
 def embedded(root: Any, motion: Motion, points: Any) -> Embedding:
     """Points (p, 3) in mm of the unit's frame embedded in a motion's mesh; raises NotPrepared in a window."""
     if not (prepared.at_once() or motion.embedding_file(points).is_file()):
-        from ...usecases.prepare import Job
+        from ...studies.prepare import Prepare
 
         of = {"one": str(motion.folder.parent), "points": key(points)}
         folder = studies.folder_of(root) / "embedding"
-        job = Job("embedding", of)
+        job = Prepare(result="embedding", of=of)
         raise prepared.NotPrepared(root, "motion of the print", folder, job, lambda *_: None, points)
     return motion.embedding(points)
 

@@ -40,7 +40,7 @@ def simulate(root, quick):
     study = root.mu_unit.study
     job = job_of(root, quick)
     # Imported late, with the solver's packages.
-    from ...studies.use_case import write_study
+    from ...studies.starting import write_study
 
     folder, job = unit_runs.place_of(studies.assign_folder(root), job)
     options = ["--device", study.device]

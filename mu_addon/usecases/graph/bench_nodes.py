@@ -3,15 +3,10 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 from ...errors import InputError
-from ...graph.definition import FILE, FOLDER, Call, Definition, Output, Outputs, Setting, setting
-from ...sensing.settings import BAUD, PORT
-from .studies import MUTED, node_of
-
-if TYPE_CHECKING:
-    from ...graph.evaluation import Finished, Order
+from ...graph.definition import FILE, FOLDER, Call, Definition, Output, Outputs, setting
+from .studies import node_of
 
 BENCH = "Bench"
 
@@ -40,45 +35,10 @@ def _calibration(call: Call) -> Outputs:
     return {"calibration": Path(file), "range": found.range_deg}
 
 
-def _record(call: Call) -> Order:
-    from ...graph.evaluation import Order
-    from ..sensor import record
-
-    names = ("port", "baud", "simulated", "seconds", "take")
-    return Order(record.USE_CASE, record.Job(**{name: call.settings[name] for name in names}))
-
-
-def _recorded(call: Call, done: Finished) -> Outputs:
-    s = done.summary
-    words = f"{s['rows']} samples, {s['duration_s']:.3g} s"
-    return {"recording": done.folder / str(s["recording"]), "words": words}
-
-
 def bench_nodes() -> tuple[Definition, ...]:
     """Definitions of the nodes of the bench."""
     return (
-        Definition(
-            "record",
-            "Record",
-            BENCH,
-            "seconds of the sensor on its serial port",
-            outputs=(Output("recording", "recording", "its samples"),),
-            settings=(
-                Setting(PORT),
-                Setting(BAUD),
-                setting(
-                    "simulated", False, "a simulated sensor that bends back and forth, in place of a port"
-                ),
-                setting("seconds", 10.0, "duration", unit="s", low=0.1, high=86_400),
-                setting(
-                    "take", 1, "raise it to record again; earlier recordings are kept", low=1, high=10_000
-                ),
-            ),
-            order=_record,
-            read=_recorded,
-            muting=MUTED,
-            remark=lambda outputs: outputs["words"],
-        ),
+        node_of("record"),
         Definition(
             "recording",
             "Recording",

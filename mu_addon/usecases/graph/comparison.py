@@ -20,10 +20,9 @@ from ...reading import is_number
 from ...report.html import figure, number, table
 from ...report.plots import BY_LENGTH, BY_START, QUIET, canvas
 from ...run.summary import SUMMARY, read_summary
+from ...studies.starting import kind_of
 from ...studies.unit_ranking import UnitStudy
 from ..parameter_study.results import figures
-from ..resume import use_case_of
-from .orders import Study
 from .parts import Design
 
 Row = dict[str, Any]
@@ -80,13 +79,11 @@ def of_runs(folders: Sequence[Path]) -> Comparison:
     names = last if len(set(last)) == len(last) else [str(folder) for folder in folders]
     items: list[tuple[str, Any]] = []
     for name, folder in zip(names, folders, strict=True):
-        case, summary = use_case_of(folder), read_summary(folder / SUMMARY)
+        kind, summary = kind_of(folder), read_summary(folder / SUMMARY)
         if not summary:
             raise InputError("that run has no results", str(folder), f"start it: resume {folder}")
-        study = case.layout == UnitStudy.layout()
-        items.append(
-            (name, Study(case.read(folder), folder, summary) if study else Finished(folder, summary))
-        )
+        study = kind.read(folder) if issubclass(kind, UnitStudy) else None
+        items.append((name, Finished(folder, summary, study)))
     statuses = [(name, str(value.summary.get("status"))) for name, value in items]
     return attrs.evolve(compare(items), unfinished=tuple(s for s in statuses if s[1] != "complete"))
 
@@ -94,21 +91,20 @@ def of_runs(folders: Sequence[Path]) -> Comparison:
 def _kind(value: Any) -> str:
     if isinstance(value, Design):
         return "unit"
-    return "study" if isinstance(value, Study) else use_case_of(value.folder).name
+    return "study" if isinstance(value.study, UnitStudy) else kind_of(value.folder).name
 
 
 def _inputs(value: Any) -> Row:
     """Inputs of a thing, by name."""
-    if isinstance(value, Finished):
+    design = value.study if isinstance(value, Finished) else value
+    if not isinstance(design, UnitStudy | Design):
         return {}
-    design = value.job if isinstance(value, Study) else value
     found: Row = {"scale": design.unit.scale, "path": design.path}
     found |= {f"{section}.{d.name}": v for section, d, v in stated(design.unit)}
-    if isinstance(value, Study):
-        job = value.job
-        found |= {"times": job.times}
-        found |= {f"mesh.{key}": v for key, v in attrs.asdict(job.mesh).items()}
-        found |= {"effects": "; ".join(job.effects.words())}
+    if isinstance(design, UnitStudy):
+        found |= {"times": design.times}
+        found |= {f"mesh.{key}": v for key, v in attrs.asdict(design.mesh).items()}
+        found |= {"effects": "; ".join(design.effects.words())}
     return found
 
 
@@ -122,7 +118,7 @@ def _results(value: Any) -> Row:
             "width_x_mm": low[1] - low[0],
             "width_y_mm": high[1] - high[0],
         }
-    if isinstance(value, Study):
+    if isinstance(value.study, UnitStudy):
         return figures(value.summary, load_material(USUAL_RESIN).density_g_per_ml)
     return _flat(value.summary)
 

@@ -9,10 +9,10 @@ from pathlib import Path
 from ...errors import MuError
 from ...graph.evaluation import WAITING, Order, State
 from ...graph.tree import NodeTree
+from ...graph.tree_file import STATES
 from ...reading import file_text, is_number, parse_json
 from ...run.progress_estimate import Plan
 from .definitions import definitions
-from .job import STATES
 
 SECONDS = {
     "simulate": 110.0,
@@ -63,7 +63,8 @@ def _planned(order_of: Callable[[str], Order | None], name: str) -> float:
     with suppress(MuError):
         order = order_of(name)
         if order is not None:
-            return sum(seconds for _, seconds in order.use_case.plan(order.job))
+            job = order.study
+            return sum(job.expected().values()) + (job.report_s if job.page else 0.0)
     return 0.0
 
 

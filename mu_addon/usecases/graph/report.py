@@ -12,13 +12,12 @@ from ...run.progress import spell
 from ...run.versions import package_versions
 from .comparison import Comparison, comparison_html
 from .definitions import definitions
-from .job import REPORT
 
 
 def write_report(found: Evaluation, folder: Path, context: RunContext, stopped: str = "") -> None:
     """Write report.html; raises OutputError."""
     with context.progress.stage("report", expected_s=2.0):
-        write_text(folder / REPORT, report(found, stopped))
+        write_text(folder / "report.html", report(found, stopped))
 
 
 def report(found: Evaluation, stopped: str = "") -> str:

@@ -3,29 +3,32 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from ...errors import MuError
 from ...files import write_json
 from ...graph.evaluation import CACHED, COMPUTED, FAILED, MADE, Evaluation, State
 from ...graph.records import read_records, record_of, write_records
-from ...graph.runs import FolderRuns, Stopped
+from ...graph.tree_file import STATES, file_name
 from ...run.context import RunContext
-from ...run.usecase import UseCase
 from .comparison import Comparison, write_comparison
 from .definitions import definitions
-from .job import LAYOUT, STATES, Job, file_name, read_job
 from .plan import plan_of
 from .report import write_report
+from .runs import FolderRuns, Stopped
+
+if TYPE_CHECKING:
+    from ...studies.graph import Graph
 
 
-def run_graph(job: Job, folder: Path, context: RunContext) -> Evaluation:
+def evaluate(job: Graph, folder: Path, context: RunContext) -> Evaluation:
     """Evaluate a tree; writes nodes.json, compare-NODE.csv and report.html.
 
     A node that fails does not keep others from being evaluated. Raises InputError for a tree with a fault,
     and at the end the first error of a node.
     """
     job.require_sound()
+    context.console_summary = console_summary
     runs = FolderRuns(folder, context.progress, job.node_reports)
     found = Evaluation(job.tree, definitions(), runs)
     records = read_records(folder)
@@ -109,6 +112,3 @@ def console_summary(summary: dict[str, Any]) -> list[str]:
         f"{name:<{width}}  {n['state']:<8}  {n['seconds']:8.3f} s  {n.get('remark', '')}".rstrip()
         for name, n in nodes.items()
     ]
-
-
-USE_CASE = UseCase("graph", LAYOUT, read_job, run_graph, console_summary)

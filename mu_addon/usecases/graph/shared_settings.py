@@ -11,12 +11,11 @@ from ...meshing import settings as mesh
 from ..simulate_and_place import settings as study
 
 SELF_CONTACT = Setting(mesh.SELF_CONTACT)
-SELF_FRICTION, TIMES = Setting(study.SELF_FRICTION), Setting(study.TIMES)
-ORIENTATION = Setting(study.ORIENTATION)
+SELF_FRICTION = Setting(study.SELF_FRICTION)
 PROTOCOL = Setting(study.PROTOCOL, FILE)
-REFINE = Setting(mesh.REFINE)
 QUICK_TIMES = Setting(study.TIMES._replace(default=7))
 QUICK_REFINE = Setting(mesh.REFINE._replace(default=0.5))
+GOALS = ("largest", "smallest")
 
 
 def of_orders(name: str, module: str = "orders") -> Callable[..., Any]:

@@ -9,18 +9,9 @@ from ...design.rigid_body import RigidBody
 from ...design.settings import FRICTION
 from ...errors import InputError
 from ...graph.definition import FILE, Call, Definition, Input, Output, Outputs, Setting, setting
-from ..simulate_and_place.settings import ALL_PATHS, CHECKS, MESH_CHECK, PATHS, STATIONS, WORKERS
 from .parts import refuse_body
-from .shared_settings import (
-    ORIENTATION,
-    PROTOCOL,
-    REFINE,
-    SELF_CONTACT,
-    SELF_FRICTION,
-    TIMES,
-    of_orders,
-)
-from .studies import MUTED, node_of
+from .shared_settings import of_orders
+from .studies import UNIT, node_of
 
 SIMULATE, PLACE, PRINT, GRASP = "Simulate", "Sensor", "Print", "Gripper"
 
@@ -40,14 +31,6 @@ def _obstacle(call: Call) -> Outputs:
     return {"obstacle": RigidBody(read_body(s["file"]), s["friction"])}
 
 
-def _study_remark(outputs: Outputs) -> str:
-    summary = outputs["study"].summary
-    angles = {float(p): a for p, a in (summary.get("angle_deg") or {}).items()}
-    words = [f"{angles[p]:.1f}° at {p:g} kPa" for p in (max(angles),)] if angles else []
-    chosen = summary.get("chosen")
-    return ", ".join([*([chosen] if chosen else []), *words])
-
-
 FIGURES = (
     "angle at the highest pressure",
     "angle at the lowest pressure",
@@ -55,37 +38,13 @@ FIGURES = (
     "volume of resin",
     "least deviation",
 )
-_TAKES_UNIT = Input("unit", ("unit",), "link a unit")
 _TAKES_STUDY = Input("study", ("study",), "link a node Simulate or Rank Paths")
 
 
 def study_nodes() -> tuple[Definition, ...]:
     """Definitions of the nodes of simulation, sensor, print and gripper."""
     return (
-        Definition(
-            "simulate",
-            "Simulate",
-            SIMULATE,
-            "the unit's motion under a pressure protocol",
-            (
-                _TAKES_UNIT,
-                Input("model", ("model",), "an extended model, by a node Diagnose", needed=False),
-                Input("obstacles", ("obstacle",), "link nodes Obstacle", needed=False, many=True),
-            ),
-            (Output("study", "study", "the motion"),),
-            (
-                PROTOCOL,
-                TIMES,
-                REFINE,
-                SELF_CONTACT,
-                SELF_FRICTION,
-                ORIENTATION,
-            ),
-            order=of_orders("simulate_order"),
-            read=of_orders("study_of"),
-            muting=MUTED,
-            remark=_study_remark,
-        ),
+        node_of("simulate"),
         Definition(
             "obstacle",
             "Obstacle",
@@ -99,20 +58,7 @@ def study_nodes() -> tuple[Definition, ...]:
             make=_obstacle,
             remark=lambda outputs: outputs["obstacle"].name,
         ),
-        Definition(
-            "place",
-            "Rank Paths",
-            PLACE,
-            "sensor paths, ranked by how much each disturbs the motion",
-            (_TAKES_STUDY,),
-            (Output("study", "study", "motion and ranking"),),
-            (*(Setting(d) for d in (STATIONS, MESH_CHECK, ALL_PATHS, PATHS, CHECKS, WORKERS)),),
-            order=of_orders("place_order"),
-            read=of_orders("study_of"),
-            muting="the study passes on without a ranking",
-            mute=lambda call: {"study": call.inputs["study"]},
-            remark=_study_remark,
-        ),
+        node_of("place"),
         Definition(
             "sensitivity",
             "Sensitivity",
@@ -152,7 +98,7 @@ def study_nodes() -> tuple[Definition, ...]:
             "Gripper",
             GRASP,
             "two equal units on a plate",
-            (_TAKES_UNIT,),
+            (UNIT,),
             (Output("gripper", "gripper", "the gripper"),),
             (
                 setting("path", "alpha4", "path of the waveguides if the unit has none"),

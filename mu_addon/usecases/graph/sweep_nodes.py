@@ -3,23 +3,15 @@
 from __future__ import annotations
 
 from ...errors import InputError
-from ...graph.definition import Call, Definition, Input, Output, Outputs, Setting, setting
+from ...graph.definition import Call, Definition, Input, Output, Outputs, setting
 from ...meshing.settings import OF_CONTINUUM
-from ..parameter_study import settings as study
 from .parts import described
-from .shared_settings import (
-    PROTOCOL,
-    QUICK_REFINE,
-    QUICK_TIMES,
-    SELF_CONTACT,
-    SELF_FRICTION,
-    of_orders,
-)
+from .shared_settings import GOALS, of_orders
+from .studies import node_of
 
 STUDY = "Parameter Study"
 FACTOR = "protocol.factor"
 REFINE = "simulate.mesh.refine"
-GOALS = ("largest", "smallest")
 _ORDERS = "sweep_orders"
 
 
@@ -90,36 +82,7 @@ def sweep_nodes() -> tuple[Definition, ...]:
             muting="the parameter is not varied",
             remark=_range_remark,
         ),
-        Definition(
-            "sweep",
-            "Parameter Study",
-            STUDY,
-            "many studies of a unit over ranges of its parameters: a table, main effects, Pareto fronts",
-            (
-                Input("unit", ("unit",), "link a unit"),
-                Input("ranges", ("range",), "link one or more nodes Range", many=True),
-            ),
-            (Output("table", "study table", "a row for each study"),),
-            (
-                Setting(study.LAST_STAGE),
-                # A range has steps.
-                Setting(study.METHOD._replace(default=study.GRID)),
-                Setting(study.POINTS),
-                Setting(study.SEED),
-                PROTOCOL,
-                QUICK_TIMES,
-                QUICK_REFINE,
-                SELF_CONTACT,
-                SELF_FRICTION,
-                setting("minimize", "", "columns of the table to minimise, for Pareto fronts"),
-                setting("maximize", "", "columns of the table to maximise"),
-                *map(Setting, (study.MEMORY, study.MINUTES, study.WORKERS)),
-            ),
-            order=of_orders("sweep_order", _ORDERS),
-            read=of_orders("table_of", _ORDERS),
-            muting="this node and those that need it are not computed",
-            remark=lambda outputs: outputs["table"].remark(),
-        ),
+        node_of("sweep"),
         Definition(
             "best",
             "Best of a Study",

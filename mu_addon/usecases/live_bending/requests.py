@@ -12,41 +12,18 @@ from pathlib import Path
 
 import attrs
 
+from ... import meshing
 from ...errors import InputError
-from ...files import write_json
-from ...meshing.settings import MeshSettings
-from ...run.folder import FolderLayout
-from ...run.inputs import FORMAT, read_inputs
-from ...studies.unit_ranking import UnitStudy as Study
-from ...studies.use_case import write_study
-from ...toml_writer import toml_text
+from ...studies.unit_ranking import UnitStudy
 
 REQUEST, BENT, ASKED = "request.json", "bent.json", "asked"
 CELLS = "cells"
 """Meshes of lattice cells that are not swept, kept from design to design."""
-LAYOUT = FolderLayout(
-    "live.toml", "# Shapes of a unit while it is designed.", (REQUEST, BENT, ASKED, CELLS, "shape-*")
-)
 LEVELS = ((0.35, 0.09), (0.5, 0.03), (1.0, 0.0))
 """Refinements in order, each with its relative error of the angle (docs/engineering/decisions.md)."""
 
 
-@attrs.frozen
-class Job:
-    """A process without fixed inputs: they come with each request."""
-
-    def texts(self) -> dict[str, str]:
-        """Text of live.toml, by its name."""
-        return {LAYOUT.inputs: toml_text({"format": FORMAT}, LAYOUT.header)}
-
-
-def read_job(folder: Path) -> Job:
-    """The job of a folder; raises InputError."""
-    read_inputs(folder / LAYOUT.inputs)
-    return Job()
-
-
-def trouble_of(study: Study) -> str:
+def trouble_of(study: UnitStudy) -> str:
     """Reason why a study's unit is not bent live, or ""."""
     if study.obstacles:
         return "with obstacles, only Simulate bends a unit"
@@ -55,13 +32,16 @@ def trouble_of(study: Study) -> str:
     return ""
 
 
-def ask(folder: Path, number: int, study: Study, pressure_kPa: float, fields: bool = False) -> None:
+def ask(folder: Path, number: int, study: UnitStudy, pressure_kPa: float, fields: bool = False) -> None:
     """Write a request to the process of a folder: bend this study's unit. Raises InputError, OutputError.
 
     pressure_kPa: found first, and above the protocol's pressures the largest. fields: find stress and
     stretch, too, after the shape.
     """
-    mesh = MeshSettings(refine=LEVELS[0][0])
+    from ...files import write_json
+    from ...studies.starting import write_study
+
+    mesh = meshing.MeshSettings(refine=LEVELS[0][0])
     study = attrs.evolve(
         study, mesh=mesh, self_contact=False, self_friction=0.0, stages=("design", "simulate")
     )

@@ -33,10 +33,8 @@ from ...files import write_json
 from ...meshing.mesh import Mesh
 from ...reading import file_bytes, parse_json
 from ...report.motion_files import Surface, SurfaceFields, surfaces_of, write_model_a
-from ...run.context import RunContext
-from ...run.usecase import UseCase
 from ...studies.unit_ranking import UnitStudy as Study
-from .requests import ASKED, BENT, CELLS, LAYOUT, LEVELS, REQUEST, Job, read_job
+from .requests import ASKED, BENT, CELLS, LEVELS, REQUEST
 
 Array = np.ndarray[Any, Any]
 
@@ -281,12 +279,9 @@ def _wall_alone_differs(a: Dimensions, b: Dimensions) -> bool:
     return attrs.evolve(b, **{name: getattr(a, name) for name in names}) == a
 
 
-def run(job: Job, folder: Path, context: RunContext) -> None:
-    """Answer requests until this process is ended; raises MuError."""
+def answer(folder: Path) -> None:
+    """Answer the requests of a folder until this process is ended; raises MuError."""
     bending = LiveBending(folder)
     while True:
         if not bending.step():
             time.sleep(LOOK_S)
-
-
-USE_CASE = UseCase("live", LAYOUT, read_job, run, lambda summary: [])

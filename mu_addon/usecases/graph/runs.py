@@ -9,18 +9,18 @@ from typing import Any
 
 import attrs
 
-from ..errors import InputError, MuError
-from ..files import make_folder
-from ..reading import file_bytes, parse_json
-from ..run.context import run_to_end
-from ..run.folder import same_inputs
-from ..run.progress import Message, Progress, Sink
-from ..run.summary import SUMMARY
-from .evaluation import Finished, Order
+from ...errors import InputError, MuError
+from ...files import make_folder
+from ...graph.evaluation import Finished, Order
+from ...graph.records import FOLDER
+from ...reading import file_bytes, parse_json
+from ...run.context import run_to_end
+from ...run.folder import same_inputs
+from ...run.progress import Message, Progress, Sink
+from ...run.summary import SUMMARY
+from ...studies.starting import start
 
 CACHE = "cache"
-FOLDER = "nodes"
-"""Folder of the runs within that of the tree."""
 # Far more than any summary holds.
 _LONGEST = 1 << 26
 # Exit statuses of a run that was asked to stop.
@@ -40,15 +40,16 @@ class FolderRuns:
 
     def place(self, order: Order) -> Path:
         """Folder of a run."""
-        return self.folder / FOLDER / f"{order.use_case.name}-{order.key[:16]}"
+        return self.folder / FOLDER / f"{order.study.command}-{order.key[:16]}"
 
     def find(self, order: Order) -> Finished | None:
         """Find the run in its folder, complete and with the same inputs."""
         place = self.place(order)
         summary = _summary(place)
-        if not order.is_done(summary) or not order.use_case.layout.is_of(place):
+        if not order.is_done(summary) or not order.study.layout().is_of(place):
             return None
-        return Finished(place, summary) if same_inputs(place, order.job.texts()) else None
+        found = Finished(place, summary, order.study)
+        return found if same_inputs(place, order.study.texts()) else None
 
     def start(self, node: str, order: Order) -> Finished:
         """Run it to its end; raises its MuError, and Stopped when the whole evaluation is to stop."""
@@ -59,7 +60,7 @@ class FolderRuns:
             _take_up(order.after / CACHE, place / CACHE)
         with run_to_end(inner) as context, inner.beating():
             context.wants_report = self.reports
-            order.use_case.start(order.job, place, context)
+            start(order.study, place, context)
         summary = _summary(place)
         stopped = context.status in _STOPPED
         if context.status and (stopped or not order.is_done(summary)):
@@ -73,7 +74,7 @@ class FolderRuns:
             if stopped:
                 raise Stopped(found)
             raise found
-        return Finished(place, summary)
+        return Finished(place, summary, order.study)
 
 
 class Stopped(Exception):
