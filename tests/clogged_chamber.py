@@ -21,7 +21,7 @@ from .made_once import made_once
 from .usecases.diagnosis_data import bent_unit
 
 
-def responses(unit, experiments, settings, cache, progress):
+def responses(unit, experiments, settings, cache, progress, held):
     assert unit.name
     progress("base", 1.0)
     kinds = sorted({(e.scale, e.orientation_deg) for e in experiments})
@@ -40,7 +40,7 @@ def judge(folder, gauge_kPa=0.0):
             job = Diagnose(
                 data=read_folder(data),
                 unit=load_preset("mu-1.0x"),
-                settings=unit_fem.UnitSettings(changes=None, whole=None),
+                settings=unit_fem.UnitSettings(whole=None),
             )
             start(job, folder / "study" / "evidence", context)
     assert context.status == 0, messages[-1]

@@ -35,14 +35,12 @@ def main() -> None:
     parser.add_argument("folder", type=Path)
     parser.add_argument("--unknown", type=Path)
     parser.add_argument("--refine", type=float, default=0.5)
-    parser.add_argument("--finer", type=float, default=0.7)
     parser.add_argument("--pressures", type=int, default=7)
     parser.add_argument("--effects", nargs="*", choices=KNOWN, default=KNOWN)
     parser.add_argument("--workers", type=int, default=1)
     options = parser.parse_args()
     settings = UnitSettings(
         mesh=MeshSettings(refine=options.refine),
-        finer=MeshSettings(refine=options.finer),
         pressures=options.pressures,
         # The ends are printed, not read off a gauge: no pressure beyond them.
         margin=0.0,

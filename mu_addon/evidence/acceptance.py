@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from .curved_reading import curved_reading
-from .effect import NUMERICS, SLIP, STEP
+from .effect import SLIP, STEP
 from .fit import PRIOR, Fit, Fitter
 from .found_causes import FALSE_ALARM_RATE, LAW, RIVAL_DELTA_CHI2, Selection
 from .plausibility import at_a_bound, held_back, unabsorbed, value_at_a_bound
@@ -50,7 +50,7 @@ def accepted(fitter: Fitter, found: Selection, less: Fit, more: Fit, p: float) -
 
 def of_the_law(less: Fit, more: Fit, taken: float) -> bool:
     """Return True if an effect gains as little beside others as an error of their laws would."""
-    return more.names[-1] != NUMERICS and less.chi2 - more.chi2 < LAW**2 * taken
+    return less.chi2 - more.chi2 < LAW**2 * taken
 
 
 def doubts(

@@ -26,8 +26,6 @@ FORCE_SCALE = "force_scale"
 CURVED_CELL = "force_nonlinearity"
 # A shift of one marker from some moment on, see `prediction.marker_slip`.
 SLIP = "marker_slip"
-# Error of the model's own mesh: present in every set of data, seen or not.
-NUMERICS = "mesh_error"
 
 _HYPHENED = re.compile(r"\b(rate|self)_(independent|heating)")
 

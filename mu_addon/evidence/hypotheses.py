@@ -101,6 +101,16 @@ def ranked(fits: Iterable[Fit]) -> list[Fit]:
     return sorted((f for f in fits if math.isfinite(f.chi2)), key=cost)
 
 
+def plausible_first(pool: Sequence[Fit]) -> list[Fit]:
+    """A pool, best first, led by a fit without a value at a bound if one does as well as the best.
+
+    Of effects that act alike one that is implausible is a rival, and no cause.
+    """
+    near = (f for f in pool if cost(f) - cost(pool[0]) < RIVAL_DELTA_CHI2 and not at_a_bound(f))
+    first = next(near, None)
+    return list(pool) if first is None else [first, *(f for f in pool if f is not first)]
+
+
 def cost(fit: Fit) -> float:
     """Akaike's criterion plus `by_search`: of equally good fits the one with fewer parameters is first."""
     return fit.chi2 + 2.0 * len(fit.keys) + by_search(fit)

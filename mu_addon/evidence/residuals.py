@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
+from functools import cached_property
 from itertools import combinations, pairwise
 from typing import Any
 
@@ -43,6 +44,8 @@ RANKED = 6
 NEAR = 0.03
 # A column of which less than this share remains after projection has no information.
 ABSORBED = 1e-3
+# Moments of a record at which its response may have changed.
+EIGHTHS = 8
 # Periods of the slowest ringing sought in the longest record: slower motion is no vibration.
 PERIODS = 10.0
 
@@ -125,14 +128,100 @@ CONDITIONS = (
 )
 
 
+@attrs.frozen(eq=False)
+class _Left:
+    """What a fit leaves of a record of N values: its whitened residual, beside all that it has fitted.
+
+    spare: what the noise may spare of a gain in chi squared, by group of series.
+    """
+
+    fitter: Fitter
+    fit: Fit
+    spare: Mapping[str, float]
+
+    @property
+    def record(self) -> Record:
+        """The record."""
+        return self.fitter.record
+
+    @property
+    def residual(self) -> Array:
+        """Whitened residual (N,)."""
+        return self.fit.residual
+
+    @cached_property
+    def clocked(self) -> list[Series]:
+        """Series with a clock, of unknown spread."""
+        return [s for s in self.record.series if s.group != KNOWN and not math.isnan(s.sample_s)]
+
+    @cached_property
+    def fitted(self) -> Array:
+        """Orthonormal columns (N, k) that span what is fitted, zeros among it."""
+        return np.hstack([self.fitter.zeros_basis, _basis(self.fit.jacobian)])
+
+    @cached_property
+    def response(self) -> Array:
+        """Change (N,) of the prediction by the first nuisance that is not a zero."""
+        fitter, values = self.fitter, self.fit.values
+        if not fitter.curved:
+            return np.ones(len(fitter.record))
+        p = fitter.curved[0]
+        moved = {**values, p.name: values[p.name] + p.step}
+        return (fitter.predict(moved) - fitter.predict(values)) / p.step
+
+    @cached_property
+    def channels(self) -> dict[str, Array]:
+        """Rows of each channel."""
+        series = self.record.series
+        names = dict.fromkeys(s.channel for s in series if s.group != KNOWN)
+        return {
+            c: np.concatenate([np.arange(s.at.start, s.at.stop) for s in series if s.channel == c])
+            for c in names
+        }
+
+    def saved(self, series: Iterable[Series]) -> float:
+        """What the noise may spare of a gain in these series."""
+        return sum(self.spare[group] for group in dict.fromkeys(s.group for s in series))
+
+    def place(self, s: Series, block: int) -> str:
+        """Experiment, channel and time of a block of a series, as text."""
+        return f"{self.record.experiments[s.experiment].name}, {s.channel}, {s.time_s[block]:.4g} s"
+
+    def gained(self, white: Array, rows: Any = slice(None)) -> tuple[float, int]:
+        """Chi squared that whitened columns (n, d) of some rows take beside what is fitted, and their rank.
+
+        Near dependences are left out, as in `_basis`; so is a column that is fitted but for rounding.
+        """
+        unit, q = _unit(white), self.fitted[rows]
+        onto = q.T @ unit
+        gram = unit.T @ unit - onto.T @ onto
+        along = unit.T @ self.residual[rows] - onto.T @ (self.fitted.T @ self.residual)
+        size = np.sqrt(np.maximum(np.diag(gram), 0.0))
+        kept = size > 1e-6
+        size = size[kept]
+        squares, vectors = np.linalg.eigh(gram[np.ix_(kept, kept)] / np.outer(size, size))
+        resolved = squares > NEAR**2
+        parts = vectors.T @ (along[kept] / size)
+        return float(np.sum(parts[resolved] ** 2 / squares[resolved])), int(resolved.sum())
+
+    def deviates(self, columns: Array) -> Array:
+        """Normal deviates (m,) of columns (N, m), each alone beside what is fitted; 0 if that has it."""
+        white = self.fitter.whitened(columns)
+        before = np.linalg.norm(white, axis=0)
+        white -= self.fitted @ (self.fitted.T @ white)
+        length = np.linalg.norm(white, axis=0)
+        resolved = length > ABSORBED * np.maximum(before, 1e-300)
+        return np.where(resolved, white.T @ self.residual / np.where(resolved, length, 1.0), 0.0)
+
+
 def dependence_table(fitter: Fitter, fit: Fit) -> list[Dependence]:
     """Every test of a fit's residual, in a fixed order, except for quantities that do not vary.
 
     The noise is the fitter's, estimated with every smooth cause set aside. A test therefore shows the model's
     misfit, and sometimes the slowest part of the noise, which such data hardly determine.
     """
-    spare = dict.fromkeys(fitter.deviance(fit), 0.0)
-    return [*_fitted_tests(fitter, fit, spare), *_plain_tests(fitter, fit)]
+    left = _Left(fitter, fit, dict.fromkeys(fitter.deviance(fit), 0.0))
+    return [*_fitted_tests(left), *_plain_tests(left)]
 
 
 def strict_table(fitter: Fitter, fit: Fit) -> list[Dependence]:
@@ -143,23 +232,20 @@ def strict_table(fitter: Fitter, fit: Fit) -> list[Dependence]:
     """
     own, refitted = fitter.under_its_own_noise(fit)
     before, after = fitter.deviance(fit), own.deviance(refitted)
-    spare = {group: max(before[group] - after[group], 0.0) for group in before}
-    found = _fitted_tests(fitter, fit, spare)
-    once, again = (_plain_tests(f, m) for f, m in ((fitter, fit), (own, refitted)))
-    found += [max(pair, key=lambda d: d.p_value) for pair in zip(once, again, strict=True)]
-    return found
+    left = _Left(fitter, fit, {group: max(before[group] - after[group], 0.0) for group in before})
+    both = zip(_plain_tests(left), _plain_tests(_Left(own, refitted, {})), strict=True)
+    return [*_fitted_tests(left), *(max(pair, key=lambda d: d.p_value) for pair in both)]
 
 
-def _fitted_tests(fitter: Fitter, fit: Fit, spare: Mapping[str, float]) -> list[Dependence]:
-    record, r = fitter.record, fit.residual
-    found = []
-    if any(s.group == KNOWN for s in record.series):
-        rows = np.concatenate([np.arange(s.at.start, s.at.stop) for s in record.series if s.group == KNOWN])
-        dof = max(len(rows) - len(fit.keys), 1)
-        found.append(_by_gain("spread", float(r[rows] @ r[rows]), dof, 0.0, "all"))
-    if all(s.group == KNOWN for s in record.series):
+def _fitted_tests(left: _Left) -> list[Dependence]:
+    record, found = left.record, []
+    known = [s for s in record.series if s.group == KNOWN]
+    if known:
+        square = sum(float(left.residual[s.at] @ left.residual[s.at]) for s in known)
+        dof = max(sum(s.at.stop - s.at.start for s in known) - len(left.fit.keys), 1)
+        found.append(_by_gain("spread", square, dof, 0.0, "all"))
+    if len(known) == len(record.series):
         return found
-    fitted = _fitted(fitter, fit)
     for name, needs, of in COVARIATES:
         held = {
             i: np.asarray(of(e), float)
@@ -167,32 +253,17 @@ def _fitted_tests(fitter: Fitter, fit: Fit, spare: Mapping[str, float]) -> list[
             if all(c in e.columns for c in needs)
             and ("pressure_kPa" not in needs or record.driven(i, "pressure_kPa"))
         }
-        found += _tested(fitted, name, _powers(record, held), spare)
-    found += _tested(fitted, "angle", _powers(record, _angles(fitter, fit)), spare)
-    response = _response(fitter, fit)
+        found += _by_channel(left, name, _powers(record, held))
+    found += _by_channel(left, "angle", _powers(record, _angles(left)))
     for name, condition in CONDITIONS:
         values = np.array([condition(e, i) for i, e in enumerate(record.experiments)], float)
-        found += _tested(fitted, name, _by_condition(record, values, response), spare)
-    return [
-        *found,
-        *_chambers(fitter, fit, response, spare),
-        *_phase(fitter, fit, spare),
-        *_breaks(fitter, fit, response, spare),
-        *_ringing(fitter, fit, spare),
-    ]
+        found += _by_channel(left, name, _by_condition(record, values, left.response))
+    return [*found, *_chambers(left), *_phase(left), *_breaks(left), *_ringing(left)]
 
 
-def _plain_tests(fitter: Fitter, fit: Fit) -> list[Dependence]:
-    record, r = fitter.record, fit.residual
-    return [
-        *_by_turn(fitter, fit),
-        *_steps(fitter, fit),
-        *_spectrum(fitter, fit),
-        *_cycles_alike(record, r),
-        *_repeats_alike(record, r),
-        *_alternating(record, r),
-        *_outliers(record, r),
-    ]
+def _plain_tests(left: _Left) -> list[Dependence]:
+    tests = (_by_turn, _steps, _spectrum, _cycles_alike, _repeats_alike, _alternating, _outliers)
+    return [d for test in tests for d in test(left)]
 
 
 def structure(table: Sequence[Dependence]) -> tuple[str, ...]:
@@ -204,44 +275,26 @@ def structure(table: Sequence[Dependence]) -> tuple[str, ...]:
     return tuple(d.against for d in sorted(table, key=lambda d: d.p_value) if d.p_value < level)
 
 
-def _response(fitter: Fitter, fit: Fit) -> Array:
-    """Change (N,) of the prediction by the first nuisance that is not a zero."""
-    if not fitter.curved:
-        return np.ones(len(fitter.record))
-    p = fitter.curved[0]
-    moved = {**fit.values, p.name: fit.values[p.name] + p.step}
-    return (fitter.predict(moved) - fitter.predict(fit.values)) / p.step
-
-
 def taken_by_scales(fitter: Fitter, fit: Fit) -> float:
     """Chi squared that a scale factor of each experiment's response takes from a fit's residual."""
-    record = fitter.record
-    response = _response(fitter, fit)
-    own = response[:, None] * (record.of_experiment[:, None] == np.arange(len(record.experiments)))
-    q = _basis(fitter.project(own))
-    return float(np.sum((q.T @ fit.residual) ** 2))
+    of, response = fitter.record.of_experiment, _Left(fitter, fit, {}).response
+    own = response[:, None] * (of[:, None] == np.arange(len(fitter.record.experiments)))
+    return float(np.sum((_basis(fitter.project(own)).T @ fit.residual) ** 2))
 
 
-def _channels(record: Record) -> tuple[str, ...]:
-    return tuple(dict.fromkeys(s.channel for s in record.series if s.group != KNOWN))
-
-
-def _angles(fitter: Fitter, fit: Fit) -> dict[int, Array]:
+def _angles(left: _Left) -> dict[int, Array]:
     """Angle (n,) at each sample, by experiments that have one: as predicted, which has no noise.
 
     A measured angle has the noise of the residual that it would be compared with, but as a drive it has no
     noise.
     """
-    found = {}
-    for i, e in enumerate(fitter.record.experiments):
-        if ANGLE not in e.columns or "time_s" not in e.columns:
-            continue
-        rows = [s.row for s in fitter.record.series if s.experiment == i and s.channel == ANGLE]
-        if rows:
-            found[i] = fitter.simulator.predict(e, fit.values)[rows[0]]
-        else:
-            found[i] = np.nan_to_num(e[ANGLE])
-    return found
+    row = {s.experiment: s.row for s in reversed(left.record.series) if s.channel == ANGLE}
+    simulator, values = left.fitter.simulator, left.fit.values
+    return {
+        i: simulator.predict(e, values)[row[i]] if i in row else np.nan_to_num(e[ANGLE])
+        for i, e in enumerate(left.record.experiments)
+        if ANGLE in e.columns and "time_s" in e.columns
+    }
 
 
 def _powers(record: Record, values: Mapping[int, Array], degree: int = 4) -> Array | None:
@@ -263,7 +316,7 @@ def _powers(record: Record, values: Mapping[int, Array], degree: int = 4) -> Arr
     return record.laid_out(powers)
 
 
-def _by_turn(fitter: Fitter, fit: Fit) -> list[Dependence]:
+def _by_turn(left: _Left) -> list[Dependence]:
     """Test against the angle that a unit is turned by within a record.
 
     Such readings have no clock, so their noise is estimated from the same residual. A share of the residual
@@ -272,27 +325,31 @@ def _by_turn(fitter: Fitter, fit: Fit) -> list[Dependence]:
     """
     from scipy.stats import beta
 
-    record, r, found = fitter.record, fit.residual, []
-    for channel in _channels(record):
+    record, found = left.record, []
+    for channel in left.channels:
         members = [s for s in record.series if s.channel == channel and _turned(record, s)]
         if not members:
             continue
         turned = np.radians(np.concatenate([s.mean(record.experiments[s.experiment][TURN]) for s in members]))
-        misfit = _cut([r[s.at] for s in members])
-        left = len(misfit) - len(members) - len(fit.keys)
+        misfit = _cut([left.residual[s.at] for s in members])
+        free = len(misfit) - len(members) - len(left.fit.keys)
         apart = np.unique(np.round(turned % (2.0 * np.pi), 6))
         for order in range(1, min(HARMONICS, (len(apart) - 1) // 2) + 1):
             wave = np.stack([np.cos(order * turned), np.sin(order * turned)], axis=1)
             q = _basis(wave - wave.mean(axis=0))
             share = float(np.sum((q.T @ misfit) ** 2) / max(misfit @ misfit, 1e-300))
             dof = q.shape[1]
-            p = float(beta.sf(min(share, 1.0), dof / 2, max(left - dof, 1) / 2))
+            p = float(beta.sf(min(share, 1.0), dof / 2, max(free - dof, 1) / 2))
             found.append(Dependence(BY_TURN, share, p, f"{channel}, {order} times a turn", dof))
-    worst = sorted(found, key=lambda d: d.p_value)[:1]
-    either = [attrs.evolve(d, p_value=min(1.0, len(found) * d.p_value)) for d in worst]
-    either += _turned_alike(record, r)
-    least = sorted(either, key=lambda d: d.p_value)[:1]
-    return [attrs.evolve(d, p_value=min(1.0, len(either) * d.p_value)) for d in least]
+    return _least([*_least(found), *_turned_alike(record, left.residual)])
+
+
+def _least(tests: Sequence[Dependence]) -> list[Dependence]:
+    """The likeliest of some tests, its p-value times their number; nothing without any."""
+    return [
+        attrs.evolve(d, p_value=min(1.0, len(tests) * d.p_value))
+        for d in sorted(tests, key=lambda d: d.p_value)[:1]
+    ]
 
 
 def _turned(record: Record, s: Series) -> bool:
@@ -320,14 +377,15 @@ def _turned_alike(record: Record, r: Array) -> list[Dependence]:
     return _by_products(BY_TURN, products, "all records alike")
 
 
-def _alternating(record: Record, r: Array) -> list[Dependence]:
-    """Test whether a residual (N,) changes its sign from reading to reading, by normal scores.
+def _alternating(left: _Left) -> list[Dependence]:
+    """Test whether a residual changes its sign from reading to reading, by normal scores.
 
     Without a clock the noise is the scatter from one to the next, so that such a misfit is as large as it.
     """
-    own = [r[s.at] for s in record.series if math.isnan(s.sample_s) and s.group != KNOWN]
-    scores = [_scores(x) for x in own if len(x) >= FEWEST_IN_A_ROW]
-    return _by_products(ALTERNATION, [-z[1:] * z[:-1] for z in scores], "readings without a clock")
+    alone = [s for s in left.record.series if math.isnan(s.sample_s) and s.group != KNOWN]
+    parts = [left.residual[s.at] for s in alone if s.at.stop - s.at.start >= FEWEST_IN_A_ROW]
+    products = [-z[1:] * z[:-1] for z in map(_scores, parts)]
+    return _by_products(ALTERNATION, products, "readings without a clock")
 
 
 def _scores(values: Array) -> Array:
@@ -350,66 +408,32 @@ def _by_condition(record: Record, values: Array, response: Array) -> Array | Non
     return np.asarray(response[:, None] * x[record.of_experiment][:, None] ** np.arange(1, 3))
 
 
-@attrs.frozen(eq=False)
-class _Fitted:
-    """Fitted subspace: k orthonormal columns span it, with the residual's (N,) components `along` (k,) them.
-
-    rows, own: of each channel, its rows of the record, and the columns there.
-    """
-
-    fitter: Fitter
-    residual: Array
-    along: Array
-    rows: Mapping[str, Array]
-    own: Mapping[str, Array]
-    groups: Mapping[str, str]
-
-
-def _fitted(fitter: Fitter, fit: Fit) -> _Fitted:
-    record = fitter.record
-    q = np.hstack([fitter.zeros_basis, _basis(fit.jacobian)])
-    rows = {
-        channel: np.concatenate(
-            [np.arange(s.at.start, s.at.stop) for s in record.series if s.channel == channel]
-        )
-        for channel in _channels(record)
-    }
-    own = {channel: q[at] for channel, at in rows.items()}
-    groups = {s.channel: s.group for s in record.series}
-    return _Fitted(fitter, fit.residual, q.T @ fit.residual, rows, own, groups)
-
-
-def _chambers(fitter: Fitter, fit: Fit, response: Array, spare: Mapping[str, float]) -> list[Dependence]:
+def _chambers(left: _Left) -> list[Dependence]:
     """Test whether markers' response to the modulus depends on their chamber.
 
     A chamber that bends unlike the rest moves the markers beyond it, and none before it. `where` names the
     marker that deviates most, and its position at rest in chambers from the inlet.
     """
-    record = fitter.record
+    record = left.record
     place = _marker_places(record)
     levels = np.unique(list(place.values()))
     if len(levels) < 2:
         return []
-    block, own = np.zeros((len(record), min(2, len(levels) - 1))), np.zeros((len(record), len(levels)))
-    for s in record.series:
-        if s.channel in place and s.group != KNOWN:
-            at = int(np.searchsorted(levels, place[s.channel]))
-            x = 2.0 * (levels[at] - levels[0]) / (levels[-1] - levels[0]) - 1.0
-            block[s.at] = response[s.at, None] * x ** np.arange(1, block.shape[1] + 1)
-            own[s.at, at] = response[s.at]
-    q = _basis(fit.jacobian)
-    white, each = (_unit(fitter.project(columns)) for columns in (block, own))
-    onto = q.T @ white
-    gain, dof = _gained(
-        white.T @ white - onto.T @ onto, white.T @ fit.residual - onto.T @ (q.T @ fit.residual)
-    )
+    members = [s for s in record.series if s.channel in place and s.group != KNOWN]
+    chamber = np.full(len(record), -1)
+    for s in members:
+        chamber[s.at] = np.searchsorted(levels, place[s.channel])
+    x = 2.0 * (levels[chamber] - levels[0]) / (levels[-1] - levels[0]) - 1.0
+    response = np.where(chamber < 0, 0.0, left.response)[:, None]
+    along = response * x[:, None] ** np.arange(1, min(2, len(levels) - 1) + 1)
+    gain, dof = left.gained(left.fitter.project(along))
     if not dof:
         return []
-    groups = {s.group for s in record.series if s.channel in place}
-    most = levels[int(np.argmax(np.abs(each.T @ fit.residual)))]
+    each = left.fitter.project(response * (chamber[:, None] == np.arange(len(levels))))
+    most = levels[int(np.argmax(np.abs(_unit(each).T @ left.residual)))]
     named = next(c for c, level in place.items() if level == most).partition("_")[0]
     where = f"{named}, {most:g} chambers from the inlet"
-    return [_by_gain("chamber", gain, dof, sum(spare[g] for g in groups), where)]
+    return [_by_gain("chamber", gain, dof, left.saved(members), where)]
 
 
 def _marker_places(record: Record) -> dict[str, float]:
@@ -423,13 +447,11 @@ def _marker_places(record: Record) -> dict[str, float]:
     scale = {e.name: e.scale for e in bent}
     # To half a chamber: positions of glued markers are no more accurate.
     chamber = {n: round(2 * z / (PITCH_MM * scale[name])) / 2 for n, (_, (*_, z), name) in seen.items()}
-    channels = _channels(record)
+    channels = dict.fromkeys(s.channel for s in record.series if s.group != KNOWN)
     return {c: chamber[n] for c in channels for n in chamber if c.startswith(f"marker{n}_")}
 
 
-def _tested(
-    fitted: _Fitted, name: str, columns: Array | None, spare: Mapping[str, float]
-) -> list[Dependence]:
+def _by_channel(left: _Left, name: str, columns: Array | None) -> list[Dependence]:
     """Joint test of all channels and the best single one, each at half of the false-alarm rate.
 
     columns (N, d): of all channels, each with separate sizes.
@@ -437,19 +459,14 @@ def _tested(
     if columns is None:
         return []
     # Series are whitened separately, so one pass serves all channels.
-    every = fitted.fitter.whitened(columns)
-    singles, groups = [], set()
-    for channel, rows in fitted.rows.items():
-        white, q = _unit(every[rows]), fitted.own[channel]
-        onto = q.T @ white
-        gain, dof = _gained(
-            white.T @ white - onto.T @ onto, white.T @ fitted.residual[rows] - onto.T @ fitted.along
-        )
+    white, singles, groups = left.fitter.whitened(columns), [], {}
+    group = {s.channel: s.group for s in left.record.series}
+    for channel, rows in left.channels.items():
+        gain, dof = left.gained(white[rows], rows)
         if dof:
-            group = fitted.groups[channel]
-            singles.append(_by_gain(name, gain, dof, spare[group], channel))
-            groups.add(group)
-    return _jointly(name, singles, sum(spare[g] for g in groups), "all channels")
+            groups[group[channel]] = left.spare[group[channel]]
+            singles.append(_by_gain(name, gain, dof, groups[group[channel]], channel))
+    return _jointly(name, singles, sum(groups.values()), "all channels")
 
 
 def _jointly(name: str, singles: Sequence[Dependence], spare: float, where: str) -> list[Dependence]:
@@ -460,23 +477,6 @@ def _jointly(name: str, singles: Sequence[Dependence], spare: float, where: str)
     best = min(reversed(singles), key=lambda d: d.p_value)
     single = attrs.evolve(best, p_value=min(1.0, len(singles) * best.p_value))
     return [_likelier(_by_gain(name, gain, dof, spare, where), single)]
-
-
-def _gained(gram: Array, along: Array) -> tuple[float, int]:
-    """Chi squared that columns take, and their rank, from their products and those with the residual (d,).
-
-    Near dependences are left out, as in `_basis`; so is a column of unit length that is zero but for
-    rounding.
-    """
-    size = np.sqrt(np.maximum(np.diag(gram), 0.0))
-    kept = size > 1e-6
-    size = size[kept]
-    if not len(size):
-        return 0.0, 0
-    squares, vectors = np.linalg.eigh(gram[np.ix_(kept, kept)] / np.outer(size, size))
-    resolved = squares > NEAR**2
-    parts = vectors.T @ (along[kept] / size)
-    return float(np.sum(parts[resolved] ** 2 / squares[resolved])), int(resolved.sum())
 
 
 def _unit(columns: Array) -> Array:
@@ -492,34 +492,28 @@ def _basis(columns: Array) -> Array:
     return np.asarray(u[:, sizes > NEAR])
 
 
-def _clocked(record: Record) -> list[Series]:
-    return [s for s in record.series if s.group != KNOWN and not math.isnan(s.sample_s)]
-
-
-def _phase(fitter: Fitter, fit: Fit, spare: Mapping[str, float]) -> list[Dependence]:
+def _phase(left: _Left) -> list[Dependence]:
     """Test for structure that repeats in every cycle: its harmonics, by channel and experiment."""
-    singles, groups = [], set()
+    singles, members = [], []
     bases: dict[Any, Array | None] = {}
-    for s in _clocked(fitter.record):
+    for s in left.clocked:
         key = s.experiment, s.group, s.clock
         if key not in bases:
-            columns = harmonics(fitter.record, s)
-            bases[key] = None
-            if columns is not None and columns.shape[1] > 1:
-                bases[key] = _basis(fitter.whitening.series(s, columns))
+            waves = harmonics(left.record, s)
+            bases[key] = None if waves is None else _basis(left.fitter.whitening.series(s, waves))
         b = bases[key]
         if b is not None:
-            gain = float(np.sum((b.T @ fit.residual[s.at]) ** 2))
-            where = f"{fitter.record.experiments[s.experiment].name}, {s.channel}"
-            singles.append(_by_gain("phase_of_cycle", gain, b.shape[1], spare[s.group], where))
-            groups.add(s.group)
-    found = _jointly("phase_of_cycle", singles, sum(spare[g] for g in groups), "")
+            gain = float(np.sum((b.T @ left.residual[s.at]) ** 2))
+            where = f"{left.record.experiments[s.experiment].name}, {s.channel}"
+            singles.append(_by_gain("phase_of_cycle", gain, b.shape[1], left.spare[s.group], where))
+            members.append(s)
+    found = _jointly("phase_of_cycle", singles, left.saved(members), "")
     best = min(reversed(singles), key=lambda d: d.p_value, default=None)
     # Where it is strongest is told in either case.
     return [attrs.evolve(best, p_value=d.p_value) for d in found if best]
 
 
-def _spectrum(fitter: Fitter, fit: Fit) -> list[Dependence]:
+def _spectrum(left: _Left) -> list[Dependence]:
     """Power of the whitened residual by bands of frequency, series of a group and of one clock together.
 
     The rounding error of readings in steps is a sawtooth, a tone, where the quantity rises steadily. Where it
@@ -527,13 +521,14 @@ def _spectrum(fitter: Fitter, fit: Fit) -> list[Dependence]:
     noise.
     """
     bands: dict[tuple[str, float], list[tuple[Array, Array, Array]]] = {}
-    for s in _clocked(fitter.record):
-        x = fit.residual[s.at]
+    for s in left.clocked:
+        x = left.residual[s.at]
         if len(x) < 32:
             continue
         f = np.fft.rfftfreq(len(x))[1:-1] / (s.sample_s * float(np.median(s.count)))
-        saw, flips = _rounding(fitter, fit, s)
-        rounded = _power(fitter.whitening.series(s, saw)) + flips / fitter.sources[s.group].white ** 2
+        saw, flips = _rounding(left, s)
+        white = left.fitter.sources[s.group].white
+        rounded = _power(left.fitter.whitening.series(s, saw)) + flips / white**2
         bands.setdefault((s.group, s.sample_s), []).append((f, _power(x), rounded))
     tests: list[Dependence] = []
     for (group, _), members in bands.items():
@@ -547,8 +542,7 @@ def _spectrum(fitter: Fitter, fit: Fit) -> list[Dependence]:
                 value /= 1.0 + 2.0 * float(rounded[inside].sum()) / dof
                 where = f"{group}, {low:.3g} to {high:.3g} Hz"
                 tests.append(_by_gain("frequency", value, dof, 0.0, where))
-    worst = sorted(tests, key=lambda d: (d.p_value, d.where))[:1]
-    return [attrs.evolve(d, p_value=min(1.0, d.p_value * len(tests))) for d in worst]
+    return _least(sorted(tests, key=lambda d: d.where))
 
 
 def _power(x: Array) -> Array:
@@ -560,189 +554,150 @@ def _power(x: Array) -> Array:
 STILL = 0.1
 
 
-def _rounding(fitter: Fitter, fit: Fit, series: Series) -> tuple[Array, float]:
+def _rounding(left: _Left, series: Series) -> tuple[Array, float]:
     """Rounding error to a channel's steps in a fit's prediction of a series (b,), in its unit.
 
     Also the variance of readings that alternate between two steps, over all of the series.
     """
     if not series.step:
         return np.zeros(series.at.stop - series.at.start), 0.0
-    e = fitter.record.experiments[series.experiment]
+    e = left.record.experiments[series.experiment]
     read = e[series.channel]
-    exact = fitter.simulator.predict(e, fit.values)[series.row] - read[np.isfinite(read)][0]
+    predicted = left.fitter.simulator.predict(e, left.fit.values)[series.row]
+    exact = predicted - read[np.isfinite(read)][0]
     still = float(np.mean(np.abs(np.diff(exact)) < STILL * series.step))
     saw = series.step * np.round(exact / series.step) - exact
     return series.mean(saw), still * (0.5 * series.step) ** 2
 
 
-def _cycles_alike(record: Record, r: Array) -> list[Dependence]:
+def _cycles_alike(left: _Left) -> list[Dependence]:
     """Test whether the whitened residuals of successive cycles correlate."""
     products = []
-    for s in _clocked(record):
-        e = record.experiments[s.experiment]
-        period = cycle_s(e) if record.driven(s.experiment, "pressure_kPa") else None
-        if period is None:
-            continue
-        lag = round(period / (s.sample_s * float(np.median(s.count))))
-        x = r[s.at]
+    for s in left.clocked:
+        driven = left.record.driven(s.experiment, "pressure_kPa")
+        period = cycle_s(left.record.experiments[s.experiment]) if driven else None
+        lag = round(period / (s.sample_s * float(np.median(s.count)))) if period else 0
+        x = left.residual[s.at]
         if 4 < lag < len(x):
             products.append(x[lag:] * x[:-lag])
     return _by_products("phase_of_cycle", products, "all cyclic records")
 
 
-def _repeats_alike(record: Record, r: Array) -> list[Dependence]:
+def _repeats_alike(left: _Left) -> list[Dependence]:
     """Test whether repeats of a protocol leave the same residual; their difference is noise."""
-    pairs = [(r[s.at], r[o.at]) for s, o in combinations(_clocked(record), 2) if repeats(record, s, o)]
-    products = [a[: len(b)] * b[: len(a)] for a, b in pairs]
-    return _by_products("repeat", products, "all repeats")
+    pairs = [(s.at, o.at) for s, o in combinations(left.clocked, 2) if repeats(left.record, s, o)]
+    both = [(left.residual[a], left.residual[b]) for a, b in pairs]
+    return _by_products("repeat", [a[: len(b)] * b[: len(a)] for a, b in both], "all repeats")
 
 
-def _steps(fitter: Fitter, fit: Fit) -> list[Dependence]:
+def _steps(left: _Left) -> list[Dependence]:
     """Test whether a channel jumped once, in an experiment or between two: every position is tried."""
-    r = fit.residual
     best, tried = (0.0, ""), 0
     known: dict[Any, Array] = {}
-    for s in _clocked(fitter.record):
+    for s in left.clocked:
         b = s.at.stop - s.at.start
         if b < 16:
             continue
         key = (s.group, b, s.sample_s, s.count[0])
         if key not in known:
             jump = np.tril(np.ones((b, b)))[:, 4:-4]
-            white = fitter.whitening.series(s, jump - jump.mean(axis=0))
-            known[key] = white / np.linalg.norm(white, axis=0)
-        z = np.abs(known[key].T @ r[s.at])
+            known[key] = _unit(left.fitter.whitening.series(s, jump - jump.mean(axis=0)))
+        z = np.abs(known[key].T @ left.residual[s.at])
         tried += len(z)
         at = int(np.argmax(z))
         if z[at] > best[0]:
-            name = fitter.record.experiments[s.experiment].name
-            best = (float(z[at]), f"{name}, {s.channel}, {s.time_s[at + 4]:.4g} s")
+            best = float(z[at]), left.place(s, at + 4)
     # Jumps at neighbouring places are nearly the same test, yet no fewer than a third are independent.
-    both = [(*best, tried), *([_moved(fitter, fit)] if len(fitter.record.experiments) > 1 else [])]
+    both = [(*best, tried), *([_moved(left)] if len(left.record.experiments) > 1 else [])]
     found = [_by_deviate("jump", z, where, 2.0 * len(both) * many) for z, where, many in both if many]
     return sorted(found, key=lambda d: d.p_value)[:1]
 
 
-def _moved(fitter: Fitter, fit: Fit) -> tuple[float, str, int]:
+def _moved(left: _Left) -> tuple[float, str, int]:
     """The clearest jump between two experiments, in standard deviations, as text, and the number tried.
 
     Of channels whose one zero is fitted for all experiments: a reglued marker or a moved camera has another
     one from then on.
     """
-    record = fitter.record
-    every: dict[str, list[Series]] = {}
-    for s in _clocked(record):
-        every.setdefault(s.channel, []).append(s)
     places: list[tuple[str, int]] = []
-    columns = []
-    for channel, own in every.items():
-        # The first is the zero itself, which must be one that is fitted.
-        for first in sorted({s.experiment for s in own}):
-            column = np.zeros(len(record))
-            for s in own:
-                column[s.at] = s.experiment >= first
-            places.append((channel, first))
-            columns.append(column)
+    columns: list[Array] = []
+    for channel in dict.fromkeys(s.channel for s in left.clocked):
+        own = [s for s in left.clocked if s.channel == channel]
+        zero, *jumps = (_from(left.record, own, first) for first in sorted({s.experiment for s in own}))
+        whole = np.linalg.norm(left.fitter.whitened(zero))
+        if np.linalg.norm(left.fitter.project(zero)) <= 1e-6 * whole:
+            places += [(channel, first) for first in sorted({s.experiment for s in own})[1:]]
+            columns += jumps
     if not columns:
         return 0.0, "", 0
-    stacked = np.stack(columns, axis=1)
-    whole = np.linalg.norm(fitter.whitened(stacked), axis=0)
-    white = fitter.project(stacked)
-    absorbed = np.linalg.norm(white, axis=0) <= 1e-6 * whole
-    zeros = {channel for (channel, _), gone in zip(places, absorbed, strict=True) if gone}
-    q = _basis(fit.jacobian)
-    white -= q @ (q.T @ white)
-    length = np.linalg.norm(white, axis=0)
-    best, tried = (0.0, ""), 0
-    for (channel, first), along, size, before in zip(
-        places, white.T @ fit.residual, length, whole, strict=True
-    ):
-        if channel not in zeros or size <= ABSORBED * before:
-            continue
-        tried += 1
-        z = abs(float(along) / float(size))
-        if z > best[0]:
-            best = z, f"{channel}, from {record.experiments[first].name} on"
-    return *best, tried
+    z = np.abs(left.deviates(np.stack(columns, axis=1)))
+    at = int(np.argmax(z))
+    channel, first = places[at]
+    where = f"{channel}, from {left.record.experiments[first].name} on"
+    return float(z[at]), where if z[at] else "", int(np.count_nonzero(z))
 
 
-def _breaks(fitter: Fitter, fit: Fit, response: Array, spare: Mapping[str, float]) -> list[Dependence]:
+def _from(record: Record, series: Iterable[Series], first: int) -> Array:
+    """A column (N,) that is 1 in these series from an experiment on, and 0 elsewhere."""
+    column = np.zeros(len(record))
+    for s in series:
+        column[s.at] = s.experiment >= first
+    return column
+
+
+def _breaks(left: _Left) -> list[Dependence]:
     """Test whether the response changed at some moment: every eighth of every experiment is tried.
 
     Each channel has a separate size, and its zero and the fitted parameters are free in each.
     """
-    record = fitter.record
-    # Experiment, time, words, and which eighth.
-    moments: list[tuple[int, float, str, int]] = []
-    for i, e in enumerate(record.experiments):
-        t = e.columns.get("time_s")
-        if t is not None:
-            at = t[0] + np.linspace(0.0, 1.0, 9)[:-1] * (t[-1] - t[0])
-            moments += [(i, float(v), f"{e.name}, {v:.4g} s", k) for k, v in enumerate(at)]
-    moments = moments[1:]
+    record, of, time = left.record, left.record.of_experiment, np.full(len(left.record), math.nan)
+    for s in left.clocked:
+        time[s.at] = s.time_s
+    clocks = {i: e["time_s"] for i, e in enumerate(record.experiments) if "time_s" in e.columns}
+    moments = [(i, k) for i in clocks for k in range(EIGHTHS)][1:]
     if not moments:
         return []
-    places = [[k for k, m in enumerate(moments) if m[0] == i] for i in range(len(record.experiments))]
-    # For experiments after the moment the whole response counts: eight moments' columns, and that one.
-    eighth = np.zeros((len(record), 9))
-    for s in _clocked(record):
-        eighth[s.at, 0] = response[s.at]
-        for k in places[s.experiment]:
-            eighth[s.at, 1 + moments[k][3]] = response[s.at] * (s.time_s >= moments[k][1])
-    white = fitter.whitening(eighth)
-    level = fitter.whitening(np.ones(len(record)))
-    gains, dof = np.zeros(len(moments)), 0
-    saved = sum(spare[g] for g in {s.group for s in _clocked(record)})
-    for channel in _channels(record):
-        members = [s for s in record.series if s.channel == channel]
-        own = [np.column_stack([level[s.at], fit.jacobian[s.at]]) for s in members]
-        q = np.split(_basis(np.concatenate(own)), np.cumsum([len(o) for o in own])[:-1])
-        # Of each experiment: squares, products with what was fitted, and with the residual.
-        square = np.zeros((len(record.experiments), 9))
-        onto = np.zeros((len(record.experiments), 9, q[0].shape[1]))
-        along = np.zeros((len(record.experiments), 9))
-        total = np.zeros(q[0].shape[1])
-        for s, part in zip(members, q, strict=True):
-            w, r = white[s.at], fit.residual[s.at]
-            square[s.experiment] += np.sum(w**2, axis=0)
-            onto[s.experiment] += w.T @ part
-            along[s.experiment] += w.T @ r
-            total += part.T @ r
-        own_, later = (np.array([m[i] for m in moments]) for i in (0, 3))
-        before = [v[own_, 1 + later] + _beyond(v[:, 0])[own_] for v in (square, onto, along)]
-        left = before[0] - np.sum(before[1] ** 2, axis=1)
-        resolved = left > 1e-6 * np.maximum(before[0], 1e-300)
-        gain = (before[2] - before[1] @ total) ** 2 / np.where(resolved, left, 1.0)
-        gains += np.where(resolved, gain, 0.0)
-        dof += 1
+    nothing = np.zeros(2)
+    ends = np.array([clocks.get(i, nothing)[[0, -1]] for i in range(len(record.experiments))])
+    begins, lasts = ends[of, :1], np.diff(ends)[of]
+    since = time[:, None] >= begins + np.arange(EIGHTHS) / EIGHTHS * lasts
+    white = left.fitter.whitening(left.response[:, None] * since)
+    # In later experiments the whole response has changed.
+    test, eighth = np.array(moments).T
+    later = np.where(of[:, None] > test, white[:, :1], np.where(of[:, None] == test, white[:, eighth], 0.0))
+    level, gains = left.fitter.whitening(np.ones(len(record))), np.zeros(len(moments))
+    for rows in left.channels.values():
+        q = _basis(np.column_stack([level[rows], left.fit.jacobian[rows]]))
+        before = np.sum(later[rows] ** 2, axis=0)
+        own = later[rows] - q @ (q.T @ later[rows])
+        square = np.sum(own**2, axis=0)
+        resolved = square > 1e-6 * np.maximum(before, 1e-300)
+        along = own.T @ left.residual[rows]
+        gains += np.where(resolved, along**2 / np.where(resolved, square, 1.0), 0.0)
     best = int(np.argmax(gains))
-    return [_by_gain("break", float(gains[best]), dof, saved, moments[best][2], len(moments))]
+    i, k = moments[best]
+    moment = clocks[i][0] + k / EIGHTHS * (clocks[i][-1] - clocks[i][0])
+    where, saved = f"{record.experiments[i].name}, {moment:.4g} s", left.saved(left.clocked)
+    return [_by_gain("break", float(gains[best]), len(left.channels), saved, where, len(moments))]
 
 
-def _beyond(v: Array) -> Array:
-    """Sums (n, ...) of v (n, ...) over all later rows."""
-    return np.asarray(v.sum(axis=0) - np.cumsum(v, axis=0))
-
-
-def _ringing(fitter: Fitter, fit: Fit, spare: Mapping[str, float]) -> list[Dependence]:
+def _ringing(left: _Left) -> list[Dependence]:
     """Test whether a unit under pressure swings after each change of it: one size for all channels.
 
     The residual is tested along the motion of a mass that the fitted model drives, by the largest of many
     modes.
     """
-    record = fitter.record
-    driven = [
-        s for s in _clocked(record) if record.driven(s.experiment, "pressure_kPa") and len(s.time_s) > 16
-    ]
+    record = left.record
+    driven = [s for s in left.clocked if record.driven(s.experiment, "pressure_kPa") and len(s.time_s) > 16]
     if not driven:
         return []
-    longest = max(float(s.time_s[-1] - s.time_s[0]) for s in driven)
+    lasts = [float(s.time_s[-1] - s.time_s[0]) for s in driven]
     # A mode somewhat faster than half the clock is seen, at another frequency.
-    fastest = max(0.75 * (len(s.time_s) - 1) / float(s.time_s[-1] - s.time_s[0]) for s in driven)
-    hertz, damping = modes(PERIODS / longest, fastest)
+    fastest = max(0.75 * (len(s.time_s) - 1) / last for s, last in zip(driven, lasts, strict=True))
+    hertz, damping = modes(PERIODS / max(lasts), fastest)
     if not len(hertz):
         return []
-    still = fitter.predict(fit.values)
+    still = left.fitter.predict(left.fit.values)
     swings = np.zeros((len(record), len(hertz)))
     clocks: dict[Any, list[Series]] = {}
     for s in driven:
@@ -752,30 +707,19 @@ def _ringing(fitter: Fitter, fit: Fit, spare: Mapping[str, float]) -> list[Depen
         found = ringing(members[0].time_s, together, hertz, damping)
         for k, s in enumerate(members):
             swings[s.at] = found[:, k]
-    swings = fitter.project(swings)
-    before = np.linalg.norm(swings, axis=0)
-    q = _basis(fit.jacobian)
-    swings -= q @ (q.T @ swings)
-    length = np.linalg.norm(swings, axis=0)
-    resolved = length > ABSORBED * np.maximum(before, 1e-300)
-    gains = np.where(resolved, swings.T @ fit.residual / np.where(resolved, length, 1.0), 0.0) ** 2
+    gains = left.deviates(swings) ** 2
     best = int(np.argmax(gains))
-    saved = sum(spare[g] for g in {s.group for s in driven})
     where = f"{hertz[best]:.3g} Hz, after changes of pressure"
-    return [_by_gain("ringing", float(gains[best]), 1, saved, where, len(hertz))]
+    return [_by_gain("ringing", float(gains[best]), 1, left.saved(driven), where, len(hertz))]
 
 
-def _outliers(record: Record, r: Array) -> list[Dependence]:
-    clocked = _clocked(record)
-    if not clocked:
-        return []
-    worst, where, tried = 0.0, "", 0
-    for s in clocked:
+def _outliers(left: _Left) -> list[Dependence]:
+    best, tried = (0.0, ""), 0
+    for s in left.clocked:
+        z = np.abs(left.residual[s.at])
         # In a burst the size of errors is unknown.
-        z = np.abs(r[s.at]) if s.louder is None else np.where(s.louder > 1.0, 0.0, np.abs(r[s.at]))
+        z = z if s.louder is None else np.where(s.louder > 1.0, 0.0, z)
         tried += len(z)
-        if z.max() > worst:
-            at = int(np.argmax(z))
-            name = record.experiments[s.experiment].name
-            worst, where = float(z[at]), f"{name}, {s.channel}, {s.time_s[at]:.4g} s"
-    return [_by_deviate("outlier", worst, where, 2.0 * tried)]
+        if z.max() > best[0]:
+            best = float(z.max()), left.place(s, int(np.argmax(z)))
+    return [_by_deviate("outlier", *best, 2.0 * tried)] if tried else []

@@ -2,21 +2,30 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Callable, Iterable, Sequence
 from itertools import combinations
 
 import attrs
 import numpy as np
 
-from .effect import CURVED_CELL, FORCE_SCALE, NUMERICS, Effect
+from .effect import CURVED_CELL, FORCE_SCALE, Effect
 from .effects import CAMERA, GRIPS
 from .effects.declaration import MACHINE
 from .fit import Fit, Fitter
 from .found_causes import LAW, RIVAL_DELTA_CHI2, TOGETHER, Cause, Selection, not_distinguished
-from .hypotheses import HALF_WAY, PROMISING, SEEDS, beside, by_search, cost, promise, ranked, refined
+from .hypotheses import (
+    HALF_WAY,
+    SEEDS,
+    beside,
+    by_search,
+    cost,
+    plausible_first,
+    promise,
+    ranked,
+    refined,
+)
 from .owned import owned_effects
-from .plausibility import value_at_a_bound
+from .plausibility import at_a_bound
 from .residuals import strict_table
 from .sensitivity import Sensitivity
 
@@ -55,12 +64,7 @@ def causes_of(
         # A rival's gain by its search is no fit.
         spent = chosen.chi2 + by_search(chosen)
         rivals = nearest(((f.effects[-1].title, f.chi2 + by_search(f) - spent) for f in tried), near)
-        if NUMERICS not in rivals:
-            # Where the mesh alone replaces it, anything beside the mesh would.
-            rivals |= _by_numerics(
-                fitter, effects, chosen, [f for f in tried if f.effects[-1].title not in rivals]
-            )
-        found.append(Cause(e, max(ps), less.chi2 - chosen.chi2, tuple(nearest(rivals.items(), math.inf))))
+        found.append(Cause(e, max(ps), less.chi2 - chosen.chi2, tuple(rivals)))
     return tuple(sorted(found, key=lambda c: -c.loss))
 
 
@@ -127,8 +131,8 @@ def coinciding(
     for c in found.causes:
         scaled = owned if set(c.effect.kinds) & set(MACHINE) else []
         fits = promising_rivals(fitter, chosen, c.effect, scaled, progress)
-        near = [f for f in fits if cost(f) - cost(chosen) < margin(fitter, found)]
-        if c.effect.among and near and cost(near[0]) < cost(chosen):
+        near = plausible_first([f for f in fits if cost(f) - cost(chosen) < margin(fitter, found)])
+        if c.effect.among and near and cost(near[0]) < cost(chosen) and not at_a_bound(near[0]):
             # One size for some replaces a size of each.
             found, near = attrs.evolve(found, chosen=near[0]), near[1:]
             c = Cause(found.chosen.effects[-1], c.p_value, c.loss, (c.effect.title, *c.rivals))
@@ -152,8 +156,8 @@ def _as_one(
     for e in tried:
         progress(e.title)
     alone = ranked(beside(fitter, (), e, base.values) for e in tried)
-    near = [f for f in alone if cost(f) - cost(chosen) < margin(fitter, found)]
-    if not near or value_at_a_bound(near[0].effects[0].parameters[0], near[0].values[near[0].keys[-1]]):
+    near = plausible_first([f for f in alone if cost(f) - cost(chosen) < margin(fitter, found)])
+    if not near or at_a_bound(near[0]):
         return found
     titles = [f.effects[0].title for f in near[1:]]
     shared = [set(c.rivals) for c in found.causes]
@@ -235,29 +239,4 @@ def _with_their_laws(fitter: Fitter, chosen: Fit, less: Fit, rivals: Sequence[Fi
             names[name] = i
     for i in names.values():
         found[i] = refined(fitter, found[i])
-    return found
-
-
-def _by_numerics(
-    fitter: Fitter, effects: Sequence[Effect], chosen: Fit, tried: Sequence[Fit]
-) -> dict[str, float]:
-    """Rivals by title that differ from the chosen model only by the error of its mesh, with the difference.
-
-    No mesh is exact, and its error differs with and without the effect. So an effect has as a rival any that
-    explains the data as well once either has a free size of that error.
-    """
-    mesh = next((e for e in effects if e.name == NUMERICS), None)
-    if mesh is None or NUMERICS in chosen.names or not tried:
-        return {}
-
-    def meshed(f: Fit) -> Fit:
-        return beside(fitter, f.effects, mesh, f.values)
-
-    reference, found = meshed(chosen), {}
-    for f in tried:
-        if f.names[-1] != NUMERICS and promise(fitter, f, mesh) > PROMISING:
-            other = meshed(f)
-            searched = by_search(other) - by_search(reference)
-            if other.chi2 - reference.chi2 + searched < RIVAL_DELTA_CHI2:
-                found[f.effects[-1].title] = other.chi2 - reference.chi2 + searched
     return found

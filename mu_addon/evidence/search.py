@@ -11,7 +11,18 @@ from .effect import BATCH, CURVED_CELL, OF, Effect
 from .effects import CAMERA, DECLARED
 from .fit import Fit, Fitter
 from .found_causes import FALSE_ALARM_RATE, LAW, RIVAL_DELTA_CHI2, Cause, Selection
-from .hypotheses import SEEDS, beside, by_all_laws, by_search, cost, hypotheses, other_seeds, ranked, refined
+from .hypotheses import (
+    SEEDS,
+    beside,
+    by_all_laws,
+    by_search,
+    cost,
+    hypotheses,
+    other_seeds,
+    plausible_first,
+    ranked,
+    refined,
+)
 from .owned import owned_effects, owners
 from .pooled import fits_among, pooled_effects, sizes_of
 from .residuals import dependence_table, strict_table, structure, taken_by_scales
@@ -246,7 +257,7 @@ def _grown(
     """
     singles, wider = found.singles, found.wider
     for seed in seeds:
-        pool = hypotheses(fitter, [seed], effects, progress, most)
+        pool = plausible_first(hypotheses(fitter, [seed], effects, progress, most))
         if seed is found.base:
             wider, singles = tuple(pool), tuple(sorted([*singles, *pool], key=cost))
         if not pool or not _leads(found, pool, singles):

@@ -38,6 +38,7 @@ FREE: dict[str, Callable[..., Simulator]] = {
     pressure_step.KIND: pressure_step.PressureStep,
     unit_pose.KIND: unit_pose.UnitPose,
 }
+HELD_TIP: dict[str, Callable[..., Simulator]] = {blocked_force.KIND: blocked_force.BlockedForce}
 
 
 def simulations_plan(experiments: Sequence[Experiment], behind: Unit | None, settings: UnitSettings) -> Plan:
@@ -76,20 +77,16 @@ def of_a_unit(
 
     Also the reasons why effects could not be simulated. progress: called with the share done.
     """
-    from .unit_fem import blocked_responses, unit_responses
+    from .unit_fem import unit_responses
 
     def share(_: str, done: float) -> None:
         progress(done)
 
     with warnings.catch_warnings(record=True) as caught:
         warnings.simplefilter("always")
-        found: dict[str, Simulator]
-        if held:
-            forces = blocked_responses(unit, experiments, settings, cache, share)
-            found = {blocked_force.KIND: blocked_force.BlockedForce(forces, experiments)}
-        else:
-            free = unit_responses(unit, experiments, settings, cache, share)
-            kinds = {e.kind for e in experiments}
-            found = {kind: FREE[kind](free, experiments) for kind in FREE if kind in kinds}
+        responses = unit_responses(unit, experiments, settings, cache, share, held)
+        kinds = {e.kind for e in experiments}
+        made = (HELD_TIP if held else FREE).items()
+        found = {kind: predicts(responses, experiments) for kind, predicts in made if kind in kinds}
     # Location and remedy on further lines belong to a simulation that nobody asked for.
     return found, [str(warning.message).partition("\n")[0] for warning in caught]

@@ -48,15 +48,14 @@ def _mesh_kept(unit: Unit, settings: MeshSettings, cache: Path | None) -> Mesh:
 class Body:
     """Inputs of a run of the unit, before it has a mesh.
 
-    finer: the mesh that mesh_error compares with. distal: number of chambers, from the tip, that a clog cuts
-    off. orientation_deg, orientation_axis: see `unit_pose.down`. gap_mm: from the tip at rest to the load
-    cell that holds it, None for a free tip. drawn: the unit that an effect has changed into this one.
-    self_contact: of walls and struts. device: Warp's, of a model.
+    distal: number of chambers, from the tip, that a clog cuts off. orientation_deg, orientation_axis: see
+    `unit_pose.down`. gap_mm: from the tip at rest to the load cell that holds it, None for a free tip. drawn:
+    the unit that an effect has changed into this one. self_contact: of walls and struts. device: Warp's, of a
+    model.
     """
 
     unit: Unit
     mesh: MeshSettings = attrs.field(factory=MeshSettings)
-    finer: MeshSettings = attrs.field(factory=MeshSettings)
     distal: int = 1
     orientation_deg: float = 0.0
     orientation_axis: Direction = X
@@ -84,8 +83,7 @@ class Body:
         """The body made whole if its weight leaves the plane of bending."""
         if not self.down[0]:
             return self
-        mesh, finer = (attrs.evolve(m, fraction="full") for m in (self.mesh, self.finer))
-        return attrs.evolve(self, mesh=mesh, finer=finer)
+        return attrs.evolve(self, mesh=attrs.evolve(self.mesh, fraction="full"))
 
     def printed(self, **changes: float) -> Body:
         """The body with other values of its print, a change of its unit."""

@@ -43,7 +43,7 @@ FREE = (KIND, pressure_step.KIND, unit_pose.KIND)
 ROUND = 0.06
 # Fewer pressures make no cubic spline.
 FEWEST = 4
-DEFAULT, FINER = MeshSettings(), MeshSettings(refine=1.5)
+DEFAULT = MeshSettings()
 # The mesh of what effects change the unit by: of an angle the same share within 2 %.
 OF_CHANGES = MeshSettings(refine=0.5)
 # Of the largest change of a value: below it, two meshes are not compared by their ratio.
@@ -54,7 +54,6 @@ CONTACT_SHARE = 0.2
 REACHES = (0.2, 0.5, NEAREST)
 FIRST_REACHES = (0.5,)
 SHARES = (0.15, 0.4, 0.7, 1.0)
-MESH_ERROR = "mesh_error"
 # Of the way from the mesh of changes to the model's, how much farther the answer may lie: a third of it by
 # the order of the elements. In suction, where walls close, it is another at each pressure.
 FARTHER, UNEVEN = 0.5, 0.25
@@ -75,18 +74,16 @@ class UnitSettings:
 
     mesh: the model's; changes: a coarser one for effects and walls, whose changes of the response are
     transferred in proportion. The difference of these two is then fitted with every hypothesis (`FARTHER`).
-    None for the model's mesh, and mesh_error, which compares it with `finer`, in its place. pressures: their
-    approximate number; margin: beyond the measured ones, as a share of their range. effects: names of those
-    to run; whole: those run at every size, None for all; the others are run and trusted at `UnitEffect.first`
-    alone. distal: chambers behind a clog. farthest_mm: of a marker from the unit, at scale 1. discrepancy: of
-    the response, as in `UnitResponse`. self_contact: of walls and struts. designs: units that differ in what
-    nobody measured, which is then fitted beside every hypothesis, None without any. workers: processes, one a
-    core.
+    pressures: their approximate number; margin: beyond the measured ones, as a share of their range. effects:
+    names of those to run; whole: those run at every size, None for all; the others are run and trusted at
+    `UnitEffect.first` alone. distal: chambers behind a clog. farthest_mm: of a marker from the unit, at scale
+    1. discrepancy: of the response, as in `UnitResponse`. self_contact: of walls and struts. designs: units
+    that differ in what nobody measured, which is then fitted beside every hypothesis, None without any.
+    workers: processes, one a core.
     """
 
     mesh: MeshSettings = DEFAULT
-    finer: MeshSettings = FINER
-    changes: MeshSettings | None = OF_CHANGES
+    changes: MeshSettings = OF_CHANGES
     pressures: int = 12
     margin: float = 0.05
     effects: tuple[str, ...] = KNOWN
@@ -161,10 +158,13 @@ def unit_responses(
     settings: UnitSettings | None = None,
     cache: Path | None = None,
     progress: Progress | None = None,
+    held: bool = False,
 ) -> tuple[UnitResponse, ...]:
     """Response of the freely bending unit at each scale and orientation of the experiments given.
 
-    Of unit_pose experiments those are the `unit_pose.STATIONS` about their axis.
+    Of unit_pose experiments those are the `unit_pose.STATIONS` about their axis. held: instead the force in N
+    on a load cell that holds the tip, of blocked_force experiments, at each scale, gap and orientation; a
+    unit of s times the size presses with s^2 times the force at the same pressures.
 
     The unit keeps its moduli at every scale, as proportional scaling has it. Its runs are kept in the folder
     `cache` and found again there, also by another call; `progress` is called with a text and the share done.
@@ -172,36 +172,11 @@ def unit_responses(
     that the base model does not reach. Raises InputError for markers out of place (`attached`) and added
     masses, which the model lacks, and ConvergenceError where the base model reaches too few pressures.
     """
-    return _computed([e for e in experiments if e.kind in FREE], unit, settings, cache, progress)
-
-
-def blocked_responses(
-    unit: Unit,
-    experiments: Sequence[Experiment],
-    settings: UnitSettings | None = None,
-    cache: Path | None = None,
-    progress: Progress | None = None,
-) -> tuple[UnitResponse, ...]:
-    """Force response in N on a load cell that holds the tip, as `unit_responses`, of blocked_force
-    experiments.
-
-    One response for each scale, gap and orientation. A unit of s times the size presses with s^2 times the
-    force at the same pressures.
-    """
     settings = settings or UnitSettings()
-    names = tuple(n for n in settings.effects if n != CONTACT)
-    chosen = [e for e in experiments if e.kind == blocked_force.KIND]
-    return _computed(chosen, unit, attrs.evolve(settings, effects=names), cache, progress)
-
-
-def _computed(
-    chosen: Sequence[Experiment],
-    unit: Unit,
-    settings: UnitSettings | None,
-    cache: Path | None,
-    progress: Progress | None,
-) -> tuple[UnitResponse, ...]:
-    settings = settings or UnitSettings()
+    if held:
+        names = tuple(n for n in settings.effects if n != CONTACT)
+        settings = attrs.evolve(settings, effects=names)
+    chosen = [e for e in experiments if e.kind in ((blocked_force.KIND,) if held else FREE)]
     report = progress or (lambda stage, share: None)
     for e in chosen:
         if e.added_mass_g:
@@ -289,7 +264,7 @@ class _Plan:
     """
 
     body: Body
-    changes: MeshSettings | None
+    changes: MeshSettings
     whole: frozenset[str] | None
     scale: float
     enlarged: float
@@ -320,7 +295,6 @@ class _Plan:
         body = Body(
             reduced,
             settings.mesh,
-            settings.finer,
             settings.distal,
             gap_mm=gap,
             self_contact=settings.self_contact,
@@ -350,8 +324,7 @@ class _Plan:
 
     def names(self, settings: UnitSettings) -> list[str]:
         """Effects that have runs, walls apart."""
-        without = MESH_ERROR if self.changes else ""
-        own = [n for n in settings.effects if ON_UNITS[n].of != WALL and n != without]
+        own = [n for n in settings.effects if ON_UNITS[n].of != WALL]
         return [*own, *(OF_HELD if self.held else ())]
 
     def case(
@@ -363,8 +336,7 @@ class _Plan:
         """
         points = tuple(tuple((m.point / self.enlarged).tolist()) for m in self.markers)
         turn, axis = orientation
-        mesh = self.changes or self.body.mesh
-        body = attrs.evolve(self.body, mesh=mesh, orientation_deg=turn, orientation_axis=axis)
+        body = attrs.evolve(self.body, mesh=self.changes, orientation_deg=turn, orientation_axis=axis)
         outline = not effect and not self.held
         return Run(body, self.pressures_kPa, points, effect, size, outline)
 
@@ -407,7 +379,7 @@ class _Plan:
         yield self.case()
         yield self.base_case
         yield from self.of_designs()
-        for name in sorted(set(self.names(settings)), key=lambda n: (n != MESH_ERROR, n)):
+        for name in sorted(set(self.names(settings))):
             effect = ON_UNITS[name]
             for orientation in self.orientations if effect.has_gravity else ((0.0, X),):
                 for size in self.sizes(name):
@@ -523,10 +495,9 @@ class _Plan:
             at = np.array(self.pressures_kPa)[reached]
             values_ = (self.larger * base.values)[kept]
             surface = self.surface(found, kept)
-            if self.changes:
-                way = values_ - (self.larger * reference.values)[kept]
-                at, values_, way, variants, surface = _with_midpoints(at, values_, way, variants, surface)
-                variants |= self._mesh_errors(at, values_, way)
+            way = values_ - (self.larger * reference.values)[kept]
+            at, values_, way, variants, surface = _with_midpoints(at, values_, way, variants, surface)
+            variants |= self._mesh_errors(at, values_, way)
             turn, axis = orientation
             gap = (self.body.gap_mm or 0.0) * self.enlarged
             how = (self.scale, turn, axis, walls, settings.discrepancy, gap)
@@ -572,8 +543,6 @@ class _Plan:
 
         There it serves gauges alone, and a body that collapses costs most.
         """
-        if not self.changes:
-            return result
         at, values = np.array(self.pressures_kPa), result.values.copy()
         reached = np.isfinite(values[0])
         low, high = self.readings_kPa
@@ -589,8 +558,6 @@ class _Plan:
 
         In proportion to how far both move from rest, which differs by the meshes' errors.
         """
-        if not self.changes:
-            return result
         rest = self.pressures_kPa.index(0.0)
         far, near = (r.values - r.values[:, [rest]] for r in (base, reference))
         least = (LEAST_CHANGE * np.nanmax(np.abs(near), axis=1, keepdims=True)) ** 2

@@ -1,21 +1,13 @@
-"""A bench that hides what is wrong with it: `python -m tests.blind.injector`, an order a line of stdin.
+"""Benches that hide what is wrong with them: a folder of measured data by an order, and its truth.
 
-For each, it writes a folder of measured data, prints a commitment (sha256 of the answer with a salt), waits
-for the line `reveal`, and only then prints the answer.
-
-An order is JSON; it holds a folder and a seed, and may hold: effect (a name, or several), times (its
-detection limit), values (sizes that are not drawn by what can be seen), unit ("written" or "simulated", or
-a kind of experiment that `machines` has a bench of), noise ("one" slow process beside white noise, "two", or
-"white"), gauge (the share of its range that is the noise of what reads the drive), and, for a unit, count,
-most, dt, rho, level, held_out, dead_load, markers.
+An order holds a seed, and may hold: effect (a name, or several), times (its detection limit), values (sizes
+that are not drawn by what can be seen), unit ("written" or "simulated", or a kind of experiment that
+`machines` has a bench of), noise ("one" slow process beside white noise, "two", or "white"), gauge (the share
+of its range that is the noise of what reads the drive), and, for a unit, count, most, dt, rho, level,
+held_out, dead_load, markers.
 """
 
-import hashlib
-import json
 import math
-import secrets
-import sys
-from pathlib import Path
 
 import numpy as np
 
@@ -25,7 +17,7 @@ from mu_addon.evidence.prediction.bench import bench_simulators
 from mu_addon.evidence.record import record
 from mu_addon.evidence.simulator import Composite
 from tests.blind.machines import BENCHES, with_channels
-from tests.blind.truth import UNITS, Simulated, observe
+from tests.blind.truth import UNITS, observe
 from tests.evidence import analytic
 
 OUTSIDE = ("resonance", "stick_slip", "torn_chamber", "camera_distortion")
@@ -85,21 +77,9 @@ def shape_of(rng, effect, total_s):
     return found
 
 
-def main():
-    for line in sys.stdin:
-        order = json.loads(line)
-        if order.get("unit") in BENCHES:
-            hide_machine(order)
-        else:
-            hide(order)
-
-
-def sealed(answer):
-    """Commit to an answer, and tell it when asked."""
-    text = json.dumps({**answer, "salt": secrets.token_hex(16)}, sort_keys=True)
-    print(json.dumps({"commitment": hashlib.sha256(text.encode()).hexdigest()}), flush=True)
-    if sys.stdin.readline().strip() == "reveal":
-        print(text, flush=True)
+def hide(order, folder):
+    """Write the folder that an order asks for."""
+    (hide_machine if order.get("unit") in BENCHES else hide_in_unit)(order, folder)
 
 
 def drawn_effects(order):
@@ -108,9 +88,8 @@ def drawn_effects(order):
     return [effects] if isinstance(effects, str) else effects
 
 
-def hide(order):
+def hide_in_unit(order, folder):
     """Serve one order of a unit under pressure."""
-    folder = Path(order["folder"])
     rng = np.random.default_rng(order["seed"])
     unit = UNITS[order.get("unit", "written")]()
     effects, times = drawn_effects(order), order.get("times", 4.0)
@@ -133,17 +112,10 @@ def hide(order):
         noise[c] = (sd * np.sqrt(1 - slow_share), sd * np.sqrt(slow_share), -dt / np.log(rho))
     base = {"modulus_factor": float(rng.uniform(0.9, 1.1))}
     zeros = rng.normal(0.0, 0.5, len(analytic.CHANNELS))
-    answer = {"effect": effects, "times": times, "count": len(tests), "dt": dt, "rho": rho, "level": level}
-    answer["gauge"] = gauge_noise(order)
     values = base | order.get("values", {})
     # Sizes that were ordered are taken as they are; others are drawn by what can be seen.
     for name in effects if "values" not in order else []:
-        found = sized(rng, unit, tests, name, times, base, noise, total)
-        if found is None:
-            answer["impossible"] = True
-            break
-        values |= found
-    answer["values"] = values
+        values |= sized(rng, unit, tests, name, times, base, noise, total)
     if order.get("held_out"):
         tests = tests + held_out(dt)
     truth = observe(tests, values, unit)
@@ -151,12 +123,10 @@ def hide(order):
     write(folder, rng, tests, truth, zeros, noise, order, clock)
     if order.get("dead_load"):
         add_dead_load(folder, rng, values["modulus_factor"])
-    sealed(answer)
 
 
-def hide_machine(order):
+def hide_machine(order, folder):
     """Serve one order of another kind of experiment."""
-    folder = Path(order["folder"])
     rng = np.random.default_rng(order["seed"])
     bench = BENCHES[order["unit"]]
     effects, times = drawn_effects(order), order.get("times", 4.0)
@@ -168,20 +138,12 @@ def hide_machine(order):
         slow_share = 0.0
     sd = level * bench.reading(base)
     source = Source(sd * np.sqrt(1 - slow_share), sd * np.sqrt(slow_share), -dt / np.log(rho))
-    answer = {"effect": effects, "times": times, "count": len(planned), "dt": dt, "rho": rho, "level": level}
-    answer["gauge"] = gauge_noise(order)
     values = base | order.get("values", {})
     for name in effects if "values" not in order else []:
-        found = sized_machine(rng, bench, planned, name, times, base, source)
-        if found is None:
-            answer["impossible"] = True
-            break
-        values |= found
-    answer["values"] = values
+        values |= sized_machine(rng, bench, planned, name, times, base, source)
     truth = bench.observe(planned, values)
     clock = float(rng.uniform(0.0, 500.0))
     write_machine(folder, rng, bench, planned, truth, source, order, clock)
-    sealed(answer)
 
 
 def sized_machine(rng, bench, planned, effect, times, base, source):
@@ -205,7 +167,7 @@ def sized_machine(rng, bench, planned, effect, times, base, source):
         return float(np.sqrt(fitter.fit((), base).chi2))
 
     size = reached(length, abs((p.high if sign > 0 else p.low) - p.null), 4.0 * times)
-    return None if size is None else shape | {key: p.null + sign * size}
+    return shape | {key: p.null + sign * size}
 
 
 def weighed(planned, observed):
@@ -248,14 +210,11 @@ def write_machine(folder, rng, bench, planned, truth, source, order, clock):
 
 
 def sized(rng, unit, tests, effect, times, base, noise, total):
-    """Values of an effect at `times` its detection limit, by the noise that is to come; None if out of reach.
+    """Values of an effect at `times` its detection limit, by the noise that is to come.
 
     The limit is that of a size whose change, nuisances fitted, is 4 standard deviations long once whitened.
     """
     shape = shape_of(rng, effect, total)
-    if effect == "mesh_error" and isinstance(unit, Simulated):
-        # The mesh settled that it is there, and how much of it; there is nothing to draw.
-        return {}
     # Channels that differ, since repeated ones are left out.
     bare = [
         analytic.experiment(
@@ -289,11 +248,11 @@ def sized(rng, unit, tests, effect, times, base, noise, total):
         return float(np.linalg.norm(j - tangent * (tangent @ j)))
 
     size = reached(length, most, 4.0 * times)
-    return None if size is None else shape | {key: null + sign * size}
+    return shape | {key: null + sign * size}
 
 
 def reached(length, most, wanted):
-    """The size, up to `most`, at which `length` of it is what is wanted; None where it never is."""
+    """The size, up to `most`, at which `length` of it is what is wanted; a ValueError where it never is."""
     # What touches only at a large size shows nothing below it, and little again where it always touches.
     low, high, now = 0.0, math.inf, 0.0
     for size in most * np.unique([*np.geomspace(1e-5, 1.0, 11), *np.linspace(0.1, 1.0, 10)]):
@@ -303,7 +262,7 @@ def reached(length, most, wanted):
             break
         low = float(size)
     if math.isinf(high):
-        return None
+        raise ValueError("no size is seen as well as that")
     size = high
     for _ in range(30):
         if abs(now / wanted - 1.0) < 0.03:
@@ -313,7 +272,9 @@ def reached(length, most, wanted):
         size = guess if low < guess < high else 0.5 * (low + high)
         now = length(size)
         low, high = (size, high) if now < wanted else (low, size)
-    return size if abs(now / wanted - 1.0) < 0.3 else None
+    if abs(now / wanted - 1.0) >= 0.3:
+        raise ValueError("no size is seen just as well as that")
+    return size
 
 
 def judged_unit(unit, experiments):
@@ -409,7 +370,3 @@ def wandering(rng, time, time_s):
     before = int(20.0 / max(1.0 - rho, 1e-3))
     shocks = rng.normal(size=before + len(time)) * np.sqrt(1.0 - rho * rho)
     return lfilter([1.0], [1.0, -rho], shocks)[before:]
-
-
-if __name__ == "__main__":
-    main()

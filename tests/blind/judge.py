@@ -1,10 +1,5 @@
-"""The judge's side: orders a hidden bench from another process, judges its folder, then has it revealed."""
+"""The judge's side: the verdict on a hidden bench's folder, held against what was hidden."""
 
-import functools
-import hashlib
-import json
-import subprocess
-import sys
 import tempfile
 from pathlib import Path
 
@@ -15,60 +10,12 @@ from mu_addon.evidence.prediction.bench import bench_simulators
 from mu_addon.evidence.prediction.unit_pressure import UnitPressure
 from mu_addon.evidence.simulator import Composite
 from mu_addon.measured import read_folder
-from mu_addon.run.processes import one_thread_each
+from tests.blind.injector import drawn_effects, hide
 from tests.blind.machines import BENCHES
 from tests.blind.truth import UNITS
 from tests.evidence import stand_ins
 
-ROOT = Path(__file__).parents[2]
 CHANGES = ("later", "shuffled", "doubled marker", "every second sample", "no marker out of the plane")
-
-
-@functools.cache
-def injector():
-    """The other process; it serves this one until this one ends."""
-    # Its matrices are small: on cores that have other work, threads would mostly wait for each other.
-    with one_thread_each():
-        return subprocess.Popen(
-            [sys.executable, "-m", "tests.blind.injector"],
-            stdin=subprocess.PIPE,
-            stdout=subprocess.PIPE,
-            text=True,
-            cwd=ROOT,
-        )
-
-
-def reply(bench, words):
-    """The line that the injector answers a line with."""
-    bench.stdin.write((words if isinstance(words, str) else json.dumps(words)) + "\n")
-    bench.stdin.flush()
-    line = bench.stdout.readline()
-    if not line:
-        injector.cache_clear()
-        raise RuntimeError("the injector ended before its time")
-    return line
-
-
-def hidden(order, judge):
-    """What `judge(folder)` says of an ordered bench, and the answer.
-
-    The commitment made before the verdict is checked.
-    """
-    bench = injector()
-    with tempfile.TemporaryDirectory() as place:
-        folder = Path(place) / "measured"
-        commitment = json.loads(reply(bench, {**order, "folder": str(folder)}))["commitment"]
-        try:
-            verdict = judge(folder)
-        except BaseException:
-            # It waits to reveal its answer: whoever asks next gets a fresh one.
-            bench.kill()
-            injector.cache_clear()
-            raise
-        sealed = reply(bench, "reveal").strip()
-        assert hashlib.sha256(sealed.encode()).hexdigest() == commitment
-        answer = json.loads(sealed)
-    return verdict, answer
 
 
 def simulator_of(order, experiments):
@@ -114,16 +61,12 @@ def changed(experiments, change):
 
 def judged(order):
     """One order as a row of plain data; same: of each change that must not matter whether it did not."""
-    again = []
-
-    def judge(folder):
+    with tempfile.TemporaryDirectory() as place:
+        folder = Path(place) / "measured"
+        hide(order, folder)
         verdict = verdict_of(folder, order)
-        for change in order.get("changes", ()):
-            other = verdict_of(folder, order, change)
-            again.append((change, other.kind, sorted(other.names), sorted(other.ambiguity)))
-        return verdict
-
-    verdict, answer = hidden(order, judge)
+        others = [(change, verdict_of(folder, order, change)) for change in order.get("changes", ())]
+    again = [(change, v.kind, sorted(v.names), sorted(v.ambiguity)) for change, v in others]
     held = verdict.gain.held_out
     said = verdict.kind, sorted(verdict.names), sorted(verdict.ambiguity)
     return {
@@ -135,24 +78,22 @@ def judged(order):
         "chosen": list(verdict.selection.chosen.names),
         "gain": held.as_json() if held else None,
         "same": [(change, tuple(other) == said, *other) for change, *other in again],
-        "outcome": outcome(
-            set(answer["effect"]), verdict, {"mesh_error"} if order.get("unit") == "simulated" else set()
-        ),
+        "outcome": outcome(set(drawn_effects(order)), verdict),
     }
 
 
 IN_SET = ("exact", "exact_with_rivals", "in_set")
 
 
-def outcome(truth, verdict, allowed=frozenset()):
-    """What a verdict is worth beside the truth; allowed: what is true of every set beside it.
+def outcome(truth, verdict):
+    """What a verdict is worth beside the truth.
 
     clean, or false: a name, or several to choose from, for nothing. exact; exact_with_rivals: leads a set of
     rivals; in_set; partly: named, but not all; wrong: named with confidence, and not true; wrong_set: several
     to choose from, not the truth; else the verdict's own kind.
     """
     names, kind = set(verdict.names), verdict.kind
-    more = names - truth - allowed
+    more = names - truth
     if not truth:
         if kind in ("none", "unidentifiable", "unexplained"):
             return "clean" if kind == "none" else kind

@@ -1,10 +1,10 @@
-"""Data whose fault is hidden from the judge in another process: the verdict is held against it afterwards."""
+"""Data whose fault is hidden from the judge: the verdict is held against it afterwards."""
 
 import numpy as np
 import pytest
 
 from mu_addon.evidence.lags import first_order_lag
-from tests.blind import judge, truth, unit_runs
+from tests.blind import truth, unit_runs
 from tests.blind.judge import CHANGES, IN_SET, judged
 
 SMALL = {"count": 3, "dt": 0.3}
@@ -21,7 +21,7 @@ HIDDEN = pytest.mark.nightly("test_a_hidden_cause_is_found")
         pytest.param({"seed": 4, "effect": "line_lag"}, IN_SET, marks=HIDDEN),
         ({"seed": 5, "effect": "wall_thickness"}, {"exact", "exact_with_rivals"}),
         pytest.param({"seed": 6, "effect": "marker_slip", "times": 10.0}, {"exact"}, marks=HIDDEN),
-        # From a finer mesh than the judge's; what the mesh misses is named beside it, or too small to be.
+        # From a finer mesh than the judge's.
         ({"seed": 9, "effect": "clogged_chamber", "unit": "simulated", "times": 10.0}, {"exact"}),
     ],
     ids=["clean", "noise that is not the judge's", "Mullins", "friction", "lag", "wall", "slip", "simulated"],
@@ -34,15 +34,6 @@ def test_a_name_that_only_the_mesh_s_error_decides_is_not_given():
     # What overcure does on the bench's mesh is more like what a thicker wall does on the judge's.
     row = judged({"seed": 2_000_001, "effect": "overcure", "times": 2.0, "unit": "simulated", "most": 6})
     assert (row["verdict"], row["outcome"]) == ("ambiguous", "in_set")
-
-
-@pytest.mark.nightly("test_a_name_that_only_the_mesh_s_error_decides_is_not_given")
-def test_where_the_mesh_s_error_would_do_in_an_effect_s_place_nothing_more_is_listed_beside_it():
-    row = judged({"seed": 2_000_101, "effect": "overcure", "times": 2.0, "unit": "simulated", "most": 6})
-    assert row["outcome"] == "in_set"
-    # Lags, friction and wear explain nothing here.
-    assert "mesh_error" in row["ambiguity"]
-    assert not {"line_lag", "rate_independent_hysteresis", "fatigue_drift"} & set(row["ambiguity"])
 
 
 @pytest.mark.nightly(
@@ -84,9 +75,8 @@ def test_what_cannot_be_told_is_refused_until_the_experiment_that_tells_is_made(
     assert "pressure_gain" not in row["identifiability"]
 
 
-def test_a_finer_mesh_judged_by_a_coarse_one_is_called_numerics():
-    row = judged(SMALL | {"seed": 10, "effect": "mesh_error", "unit": "simulated", "level": 0.03})
-    assert (row["verdict"], row["names"]) == ("named", ["mesh_error"])
+def test_a_finer_mesh_than_the_judge_s_is_no_cause():
+    assert judged(SMALL | {"seed": 10, "unit": "simulated", "level": 0.03})["outcome"] == "clean"
 
 
 @pytest.mark.nightly("tests/evidence/test_verdict.py::test_what_does_not_matter_does_not_change_the_verdict")
@@ -98,16 +88,6 @@ def test_what_does_not_matter_does_not_change_the_verdict_and_the_gain_is_on_wha
     gain = row["gain"]
     assert gain["rmse_after"] < min(gain[f"rmse_{k}"] for k in ("before", "permuted", "black_box"))
     assert 0.0 < gain["low95"] < gain["high95"]
-
-
-def test_a_broken_commitment_is_noticed(monkeypatch):
-    honest = judge.reply
-    monkeypatch.setattr(
-        judge, "reply", lambda bench, words: honest(bench, words).replace('"dt": 0.3', '"dt": 0.4')
-    )
-    monkeypatch.setattr(judge, "verdict_of", lambda folder, order, change=None: None)
-    with pytest.raises(AssertionError):
-        judge.hidden(SMALL | {"seed": 1}, lambda folder: None)
 
 
 def test_the_bench_integrates_by_a_rule_of_its_own_that_agrees_where_both_are_exact():
@@ -128,7 +108,7 @@ def test_the_simulated_bench_differs_from_the_judge_s_model_by_the_mesh_alone():
     apart = np.abs(truly - known)[0]
     assert 0.02 < apart.max() < 0.5
     # All the way to the finer mesh, and a little beyond, as the bench's is finer still.
-    better = [np.abs(truly - model.at(p, {"mesh_error": s}))[0].max() for s in (0.5, 1.0)]
+    better = [np.abs(truly - model.at(p, {"mesh_share": s}))[0].max() for s in (0.5, 1.0)]
     assert better[1] < better[0] < apart.max()
     np.testing.assert_allclose(hidden.still(np.zeros(1), {}, 1.0, 0.0, 1.0)[0], 0.0, atol=1e-9)
     assert hidden.still(np.array([20.0]), {"wall_thickness": 1.2}, 1.0, 0.0, 1.0)[0] < truly[0, -10]
@@ -138,4 +118,4 @@ def test_the_table_of_runs_holds_what_battery_and_judge_ask_of_it():
     runs = unit_runs.table()
     assert all(np.isfinite(v).all() for v in runs.values())
     assert {f"hidden {n} {s:g} 0" for n, sizes in unit_runs.SIZES.items() for s in sizes} <= set(runs)
-    assert set(unit_runs.JUDGED) == set(unit_runs.response(runs, 0.0).variants)
+    assert {"mesh_share", *unit_runs.SIZES} == set(unit_runs.response(runs, 0.0).variants)

@@ -154,7 +154,7 @@ class Simulated:
 
         base = self._runs["hidden"]
         self._spline = make_interp_spline(pressures, base, k=5, axis=1)
-        self.parameters = {"mesh_error": EFFECTS["mesh_error"].parameter}
+        self.parameters = {}
         self._changes = {}
         for name, sizes in unit_runs.SIZES.items():
             for turn in unit_runs.TURNS if EFFECTS[name].has_gravity else (0.0,):
@@ -189,7 +189,7 @@ class Simulated:
         for name, size in sizes.items():
             if name in self._weighs:
                 c = c + self._changes[name, turn](size / stiffness)
-            elif name != "mesh_error":
+            else:
                 c = c + self._changes[name, 0.0](size)
         return BSpline(self._spline.t, c, self._spline.k)(pressure).T
 

@@ -21,7 +21,6 @@ STATIC = {
     "wall_thickness": Parameter("change_mm", "mm", -0.3, 0.3, 0.0, (0.05,), "printer"),
     "clogged_chamber": Parameter("share_lost", "", 0.0, 1.0, 0.0, (0.1,), "third chamber"),
     "contact": Parameter("overlap_deg", "deg", 0.0, 30.0, 0.0, (5.0,), "table"),
-    "mesh_error": Parameter("coarseness", "", 0.0, 1.0, 0.0, (0.3,), "element size over the default's"),
 }
 GRID = {
     "gravity": (0.0, 500.0, 1200.0, 2500.0),
@@ -30,7 +29,6 @@ GRID = {
     "wall_thickness": (-0.3, -0.1, 0.0, 0.1, 0.3),
     "clogged_chamber": (0.0, 0.2, 0.5, 1.0),
     "contact": (0.0, 0.6, 1.2, 2.5, 5.0, 7.5, 10.0, 15.0, 20.0, 30.0),
-    "mesh_error": (0.0, 0.2, 0.5, 1.0),
 }
 
 
@@ -41,9 +39,9 @@ def channels(pressure_kPa, sizes=None, scale=1.0, orientation_deg=0.0):
     x = x * (1.0 - s["clogged_chamber"] * (np.arange(6) == 2))
     grown = s["overcure"] / scale
     thicker = s["wall_thickness"] / scale
-    first = 4.0 * (1.0 - 1.6 * grown - 0.9 * thicker - 0.03 * s["mesh_error"])
-    second = 0.9 * (1.0 + 3.0 * grown - 1.5 * thicker + 0.10 * s["mesh_error"])
-    third = -0.25 * (1.0 + 1.0 * grown + 4.0 * thicker - 0.25 * s["mesh_error"])
+    first = 4.0 * (1.0 - 1.6 * grown - 0.9 * thicker)
+    second = 0.9 * (1.0 + 3.0 * grown - 1.5 * thicker)
+    third = -0.25 * (1.0 + 1.0 * grown + 4.0 * thicker)
     ends = 1.0 + thicker * np.linspace(-0.5, 0.5, 6) + grown * np.linspace(0.4, -0.4, 6)
     bend = SHAPE * ends * (first * x + second * x**2 + third * x**3) / (1.0 + s["strain_stiffening"] * x**2)
     tilt = np.cumsum(bend, axis=1)

@@ -135,14 +135,14 @@ def test_owners_are_specimens_and_for_instruments_experiments():
             for e in owned_effects([Effect(name, (size,), ("pressure_hold",))], made)
             if e.name == name
         ]
-        for name in ("viscoelasticity", "pressure_drift", "leak", "mesh_error")
+        for name in ("viscoelasticity", "pressure_drift", "leak", "gravity")
     }
     each = [f"experiment {e.name}" for e in made]
     assert of == {
         "viscoelasticity": ["specimen A", "specimen B"],
         "pressure_drift": each,
         "leak": ["specimen A", "specimen B", *each],
-        "mesh_error": [],
+        "gravity": [],
     }
     assert not owned_effects([Effect("leak", (size,), ("pressure_hold",))], made[:1])
 

@@ -89,9 +89,7 @@ def test_a_thinner_wall_is_named_though_every_size_has_a_mesh_of_its_own(tmp_pat
         tests.append(analytic.experiment(name, t, p, {"angle_deg": noisy}))
     effects = ("wall_thickness", "gravity")
     # Data and model are of one code and one way of meshing: there is no discrepancy between them.
-    settings = UnitSettings(
-        ROUGH, ROUGH, None, 5, effects=effects, whole=None, self_contact=False, discrepancy=0.0
-    )
+    settings = UnitSettings(ROUGH, ROUGH, 5, effects=effects, whole=None, self_contact=False, discrepancy=0.0)
     found = diagnose(
         tests,
         Composite({"unit_pressure": UnitPressure(unit_responses(SMALL, tests, settings, tmp_path), tests)}),

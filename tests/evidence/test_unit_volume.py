@@ -57,7 +57,7 @@ def test_it_is_predicted_beside_the_angle_with_a_zero_of_its_own(tmp_path, grown
     pressure = np.array([0.0, 2.0, 4.0, 6.0, 8.0, 4.0, 0.0, -3.0])
     columns = {"time_s": time, "pressure_kPa": pressure, "volume_mm3": np.zeros(8), "angle_deg": np.zeros(8)}
     e = experiment("unit_pressure", columns)
-    settings = UnitSettings(ROUGH, changes=None, effects=(), pressures=6, self_contact=False, workers=1)
+    settings = UnitSettings(ROUGH, ROUGH, effects=(), pressures=6, self_contact=False, workers=1)
     (response,) = unit_responses(UNIT, [e], settings, tmp_path)
     assert response.channels == ("angle_deg", "volume_mm3")
     model = UnitPressure([response], [e])

@@ -88,7 +88,7 @@ def test_it_leaves_a_table_and_a_report(tmp_path):
 
 
 def test_a_unit_is_simulated_once_and_what_that_leaves_out_is_noted(tmp_path, monkeypatch):
-    def response(unit, experiments, settings, cache, progress):
+    def response(unit, experiments, settings, cache, progress, held):
         assert (len(experiments), settings.self_contact, cache) == (2, False, tmp_path / "out" / "cache")
         warnings.warn(
             "contact with 2 N is left out\n  where: unit", unit_fem.UnitResponseWarning, stacklevel=1

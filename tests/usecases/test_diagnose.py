@@ -43,7 +43,7 @@ ROOT = Path(__file__).parents[2]
 PAPER = ROOT / "assets" / "examples" / "paper-moduli"
 OFFSET_mm = 0.09
 # Of data in closed form: a printed unit's effects are simulated at few sizes first.
-ALL_SIZES = {"settings": UnitSettings(changes=None, whole=None)}
+ALL_SIZES = {"settings": UnitSettings(whole=None)}
 
 
 def run(folder, out, unit=None, **options):

@@ -99,7 +99,7 @@ def ran(job, folder):
 
 def test_every_static_effect_of_the_evidence_can_be_simulated():
     assert set(SIZES) == set(STATIC)
-    assert set(EFFECTS) - set(STATIC) == {"overcure", "skin_cure", "wall_thickness", "mesh_error"}
+    assert set(EFFECTS) - set(STATIC) == {"overcure", "skin_cure", "wall_thickness"}
 
 
 @pytest.mark.parametrize("name", STATIC)
@@ -108,7 +108,7 @@ def test_a_simulation_is_what_the_evidence_computes_of_the_same_effect(name, mes
     size, effect = SIZES[name], EFFECTS[name]
     of_model = ExtendedModel("named", {name: {effect.parameter.name: Fitted(size, 0, 0, 0)}}, {})
     effects = attrs.evolve(extend(SHORT, of_model).effects, orientation_deg=90.0)
-    job, body = attrs.evolve(JOB, effects=effects), Body(SHORT, ROUGH, ROUGH, orientation_deg=90.0)
+    job, body = attrs.evolve(JOB, effects=effects), Body(SHORT, ROUGH, orientation_deg=90.0)
     base = body.materials(mesh)
     materials = effect.materials(base, mesh, size) if effect.materials else base
     model = effect.model(body, mesh, size) if effect.model else body.model(mesh)
@@ -347,7 +347,6 @@ def test_what_has_no_place_in_a_simulation_is_left_out_and_says_why():
     effects = {
         "pressure_gain": {"gain": Fitted(0.1, 0, 0, 0)},
         "contact": {"reach_mm": Fitted(2.0, 0, 0, 0)},
-        "mesh_error": {"share": Fitted(1.0, 0, 0, 0)},
         "gravity": {"density_kg_m3": Fitted(1100.0, 0, 0, 0)},
     }
     found = extend(UNIT, ExtendedModel("ambiguous", effects, {}, rivals=("line_lag", "leak of specimen B")))

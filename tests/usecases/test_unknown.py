@@ -71,7 +71,7 @@ def written(folder):
 
 def test_a_shape_that_nobody_measured_is_found_and_no_cause_named(tmp_path, closed_form):
     settings = UnitSettings(
-        MeshSettings(refine=0.3), changes=None, pressures=7, margin=0.0, effects=(), workers=1
+        MeshSettings(refine=0.3), MeshSettings(refine=0.3), pressures=7, margin=0.0, effects=(), workers=1
     )
     unknown = read_unknown(TEXT, "unknown.toml", UNIT)
     measured = read_folder(written(tmp_path / "data"))
@@ -158,7 +158,7 @@ def test_no_cause_is_named_while_dimensions_are_unknown(tmp_path, closed_form):
     for path in folder.glob("*_0.75x.csv"):
         path.write_text(path.read_text().replace("-70.0,", "-35.0,").replace("50.0,60.0,", "50.0,30.0,"))
     settings = UnitSettings(
-        MeshSettings(refine=0.3), changes=None, pressures=7, margin=0.0, effects=(), workers=1
+        MeshSettings(refine=0.3), MeshSettings(refine=0.3), pressures=7, margin=0.0, effects=(), workers=1
     )
     unknown = read_unknown(TEXT, "unknown.toml", UNIT)
     with run_to_end(Progress()) as context:

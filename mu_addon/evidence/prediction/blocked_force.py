@@ -39,7 +39,7 @@ class BlockedForce:
     tip does not reach it. A blocked unit hardly deforms, so that its moduli have little effect. They scale by
     one factor (m F(p/m)), and relax as an integral over the history of pressure and force. Friction in the
     resin and Mullins' softening need motion and are left out. responses: forces in N with the tip held
-    (`blocked_responses`), one a scale, gap and orientation. Raises InputError without a response.
+    (`unit_responses`), one a scale, gap and orientation. Raises InputError without a response.
     """
 
     def __init__(self, responses: Sequence[UnitResponse], experiments: Sequence[Experiment] = ()) -> None:

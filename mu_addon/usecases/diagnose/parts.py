@@ -211,9 +211,14 @@ def rivals(found: JudgedData) -> Iterator[Part]:
 def _against(found: JudgedData, f: Fit, rivals: set[str]) -> str:
     selection = found.verdict.selection
     e, gained = f.effects[0], selection.base.chi2 - f.chi2
-    sizes = zip(e.keys, e.parameters, strict=True)
-    at = [bare(p) for k, p in sizes if _ends(p, f.values[k], f.values[k])]
-    bound = f"; {' and '.join(at)} at its bound" if at else ""
+    sizes = [(p, f.values[k]) for k, p in zip(e.keys, e.parameters, strict=True)]
+    at = [f"{bare(p)} at its bound" for p, size in sizes if _ends(p, size, size)]
+    at += [
+        f"{bare(p)} beyond what is plausible"
+        for p, size in sizes
+        if not p.plausible[0] <= size <= p.plausible[1]
+    ]
+    bound = "".join(f"; {words}" for words in at)
     if e.title in _titles(selection.chosen):
         if not found.verdict.names:
             return "part of the best fit"

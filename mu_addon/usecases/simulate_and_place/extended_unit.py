@@ -33,7 +33,6 @@ _DESCRIPTIONS = {
 # Effects that a simulation gets otherwise.
 _ELSEWHERE = {
     "contact": "obstacles are given with --obstacle",
-    "mesh_error": "a finer mesh is given with --refine",
 }
 _NOWHERE = (
     "it concerns a gauge, a clock, a camera or the bench, which a simulation of the unit does not contain"
