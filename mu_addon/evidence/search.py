@@ -196,7 +196,10 @@ def reselected(fitter: Fitter, seen: Sequence[Sensitivity], found: Selection) ->
     effects = [f.effects[0] for f in singles]
     table = tuple(strict_table(fitter, chosen))
     causes = causes_of(fitter, effects, base, chosen, ps, [singles], not (doubted or structure(table)))
-    return Selection(base, chosen, causes, singles, table_base, table, found.p_best, doubted)
+    again = Selection(base, chosen, causes, singles, table_base, table, found.p_best, doubted)
+    if not of_some_tests(again):
+        return again
+    return _beside_the_step(again, [fitter.fit(f.effects, f.values) for f in found.wider if _of_specimens(f)])
 
 
 def one_more(
@@ -318,7 +321,7 @@ def select_pooled(
     found = attrs.evolve(found, wider=(*found.wider, *(f for _, f in fits)))
     gain, best = fits[0]
     if found.causes and gain < _gained(found) + RIVAL_DELTA_CHI2:
-        return _beside_the_step(found, fits)
+        return _beside_the_step(found, [f for _, f in fits])
     own = sizes_of(best.effects[0])
     tried = len(pooled_effects(fitter.simulator.effects, fitter.record.experiments))
     p = by_count(gain, 1 + len(best.effects[0].keys) - len(own), 0.5 * tried)
@@ -345,7 +348,7 @@ def _gained(found: Selection) -> float:
     return found.base.chi2 - found.chosen.chi2 - by_search(found.chosen)
 
 
-def _beside_the_step(found: Selection, fits: Sequence[tuple[float, Fit]]) -> Selection:
+def _beside_the_step(found: Selection, fits: Sequence[Fit]) -> Selection:
     """A selection whose change of some tests has as rivals what differs from specimen to specimen as well.
 
     Where no specimen was tested on both sides of a change, its specimens may be what changed: always a rival
@@ -353,10 +356,8 @@ def _beside_the_step(found: Selection, fits: Sequence[tuple[float, Fit]]) -> Sel
     """
     found_too = [
         fit.effects[0].title
-        for _, fit in fits
-        if fit.effects[0].among == "specimen"
-        and fit.names[0] in OF_SPECIMENS
-        and fit.chi2 < found.chosen.chi2 + RIVAL_DELTA_CHI2
+        for fit in fits
+        if _of_specimens(fit) and fit.chi2 < found.chosen.chi2 + RIVAL_DELTA_CHI2
     ]
     causes = [
         attrs.evolve(c, rivals=tuple(dict.fromkeys((*c.rivals, *(t for t in found_too if _new(t, c))))))
@@ -365,6 +366,10 @@ def _beside_the_step(found: Selection, fits: Sequence[tuple[float, Fit]]) -> Sel
         for c in found.causes
     ]
     return attrs.evolve(found, causes=tuple(causes))
+
+
+def _of_specimens(fit: Fit) -> bool:
+    return fit.effects[0].among == "specimen" and fit.names[0] in OF_SPECIMENS
 
 
 def _new(title: str, cause: Cause) -> bool:

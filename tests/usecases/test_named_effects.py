@@ -355,10 +355,9 @@ def test_what_has_no_place_in_a_simulation_is_left_out_and_says_why():
     assert found.applied == ("solid parts have a density of 1100 kg/m³",)
     assert "gravity" in found.doubt
     assert "line lag or leak of specimen B" in found.doubt
-    gain, contact, finer = found.left_out
+    gain, contact = found.left_out
     assert "gauge" in gain
     assert "--obstacle" in contact
-    assert "--refine" in finer
     # What a file keeps of it says as much of gravity, and nothing of the rest.
     assert list(found.kept.effects) == ["gravity"]
     again = extend(UNIT, found.kept)
