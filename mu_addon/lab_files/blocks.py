@@ -483,7 +483,7 @@ def _facts(rows: Sequence[Row]) -> dict[str, tuple[str, ...]]:
             cells = [match[1], *([match[2]] if match[2] else []), *cells[1:]]
         if len(cells) == 2:
             # A value with its unit in one cell.
-            apart = re.match(r"([+-]?[\d.,]+)\s*([^\d\s].*)$", cells[1])
+            apart = re.match(r"([+-]?[\d.,]+)\s*([^\d\s.,].*)$", cells[1])
             if apart:
                 cells = [cells[0], apart[1], apart[2]]
         if len(cells) == 3 and is_unit(cells[1]) and is_like_number(cells[2]):

@@ -80,7 +80,7 @@ _UNITS = {
     for name, factor in names.items()
 }
 # These differ from others by their case alone.
-_BY_CASE = {"MN": ("N", 1e6), "mPa": ("kPa", 1e-6), **dict.fromkeys(("M", "S", "v", "H"))}
+_BY_CASE = {"MN": ("N", 1e6), "mPa": ("kPa", 1e-6), **dict.fromkeys(("M", "S", "v", "H", "Nm"))}
 
 # A unit of pressure with the zero it counts from, such as psia, bar(g) and kPa abs, and titles that say so.
 _REFERENCE = re.compile(
@@ -104,7 +104,7 @@ _WORDS = tuple(
         (
             "count",
             r"\brate\b|speed|velocity|geschwindigkeit|vitesse|velocita|velocidad|temperat|\btemp\b|humid|feuchte|"
-            r"accel|energy|energie|\bwork\b|modulus|frequen|скорост|温度|速度|온도|속도",
+            r"accel|energy|energie|\bwork\b|torque|drehmoment|modulus|frequen|скорост|温度|速度|온도|속도",
         ),
         ("orientation", r"orientation|\bpose\b|\broll\b|\blage\b|orientacja|orientamento|orientacion"),
         ("angle", r"angle|winkel|angolo|angulo|\bkat\b|hoek|vinkel|kulma|szog|\buhel|\baci\b|угол|角度|각도"),
@@ -121,7 +121,7 @@ _WORDS = tuple(
         ),
         (
             "pressure",
-            r"pressure|vacuum|vakuum|\bdruck\b|uberdruck|innendruck|pression|pressione|presion|cisnienie|pressao|\bdruk\b|\btryk|"
+            r"pressure|vacuum|vakuum|druck\b|pression|pressione|presion|cisnienie|pressao|\bdruk\b|\btryk|"
             r"paine\b|nyomas|\btlak|basinc|давление|压力|壓力|圧力|압력",
         ),
         (
@@ -140,7 +140,7 @@ _WORDS = tuple(
         ("added_mass", r"added.mass|zusatzmasse"),
         (
             "displacement",
-            r"extension|\bext\b|displacement|\bstretch\b|\bdispl?\b|standardweg|\bweg\b|verschiebung|deplacement|spostamento|desplazamiento|"
+            r"extension|\bext\b|displacement|\bdistance\b|\blvdt\b|\bstretch\b|\bdispl?\b|standardweg|\bweg\b|verschiebung|deplacement|spostamento|desplazamiento|"
             r"przemieszczenie|stroke|\bhub\b|course|corsa|travel|verformung|deformation|deflection|elongation|"
             r"verplaatsing|deslocamento|alongamento|alargamiento|forskydning|forskyvning|forflyttning|siirtyma|"
             r"elmozdulas|\bposuv|posunuti|prodlouzeni|uzama|allongement|wydluzenie|verlangerung|"
@@ -155,7 +155,7 @@ _WORDS = tuple(
         ),
         (
             "count",
-            r"^#$|\bnr\b|\bno\b|number|index|count|\bframes?\b|cycle|zyklus|schritt|\bstep\b|point|номер|序号|番号|번호",
+            r"^#$|\bnr\b|\bno\b|\bstage\b|number|index|count|\bframes?\b|cycle|zyklus|schritt|\bstep\b|point|номер|序号|番号|번호",
         ),
     )
 )
@@ -218,8 +218,8 @@ def column(title: str, unit: str = "") -> Column:
         name, unit = _apart(title)
     unit = unit.strip().strip("()[]{}").strip()
     known = unit_of(unit) if unit else None
-    if known and known[1] == 60.0 and unit.casefold() == "min" and _meant(name, "s") != "time":
-        # A minimum, as beside a (Max).
+    if known and unit.casefold() in ("min", "h", "d") and _meant(name, "s") != "time":
+        # A minimum, as beside a (Max), a height, or tan d.
         name, unit, known = title, "", None
     if unit and not known and _COMPOUND.fullmatch(unit):
         return Column(title, "count", unit, None)

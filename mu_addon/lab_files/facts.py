@@ -72,7 +72,7 @@ def _size_mm(facts: Facts, pattern: re.Pattern[str], decimal: str) -> float | No
     for key, cells, text, end in _named(facts, pattern):
         value = None
         if cells and end <= len(key):
-            unit = cells[1] if len(cells) > 1 else (re.search(_BRACKET, key) or ["", ""])[1]
+            unit = cells[1] if len(cells) > 1 else (re.search(_BRACKET, key) or ["", key[end:]])[1]
             value = _in_mm(cells[0], unit, decimal)
         behind = _BEHIND.match(text, end)
         if value is None and behind:

@@ -16,12 +16,24 @@ from .quantities import ask_column, may_hold
 
 _TENSION = re.compile(r"tensil|tension test|zugversuch|\bzug\b|traction|trazione|traccion|rozciagan")
 _COMPRESSION = re.compile(r"compress|druckversuch|stauch|druckspannung|\bdruck\b|schiacc|sciskan")
-# Titles of a table of amplitudes, by frequency or temperature.
-_OSCILLATION = re.compile(
+# Titles of amplitudes, by frequency or temperature.
+_OSCILLATION = (
     r"oscillat|\bosz|schwing|amplitud|dynamic (strain|stress|force|displ)|"
     r"(storage|loss|complex) mod|speichermod|verlustmod|module de (conservation|"
     r"perte)|modulo (elastico|viscoso)|tan ?\W?(delta|d\b|\u03b4)|loss factor|verlustfaktor|"
     r"\b[eg]['\u2032\"\u2033]|\bfrequen|\bfreq\b|\bf ?[/\[(] ?hz|phase angle|phasenwinkel"
+)
+# What titles say against a stress-strain curve: of any column, and of one that is read as stress or strain.
+_OF_ANY = (
+    (_OSCILLATION, "shows a test by oscillation: its loads are amplitudes, and no stress-strain curve"),
+    (r"shear rate|scherrate|schergeschw|vis[ck]osit", "shows a test in shear, not in tension or compression"),
+)
+_OF_READ = (
+    (r"(?<!pure )shear|\bscher|\bschub|cisaill|taglio|cizall", "is of shear, not of tension or compression"),
+    (
+        r"\btrue\b|\bwahr|\bvrai|cauchy|hencky|logarithm",
+        "is true, not nominal: by the deformed size",
+    ),
 )
 # Columns that are asked for at most.
 _MOST_ASKED = 12
@@ -108,20 +120,22 @@ def _is_stepped(columns: Mapping[str, Array]) -> bool:
 
 
 def require_curve(draft: Proposal) -> Proposal:
-    """Raise NoExperiment for amplitudes of an oscillation, and for one strain alone.
+    """Raise NoExperiment for amplitudes, shear, true stress or strain, and for one strain alone.
 
     A column whose quantity is answered is taken as it is.
     """
     if draft.kind not in LOADED:
         return draft
+    loads = {draft.table[name].place for name in ("strain", "stress_kPa") if name in draft.table}
     for k, one in enumerate(draft.block.columns):
-        if _OSCILLATION.search(plain(one.title)) and draft.answer_on("column", one)[1] is None:
+        against = (*_OF_ANY, *(_OF_READ if k in loads else ()))
+        why = next((words for pattern, words in against if re.search(pattern, plain(one.title))), "")
+        if why and draft.answer_on("column", one)[1] is None:
             raise NoExperiment(
-                f"{draft.title(k)} shows a test by oscillation: its loads are amplitudes, and no "
-                "stress-strain curve",
+                f"{draft.title(k)} {why}",
                 draft.where,
-                "export a test of one pull or pressing; if each row is a reading of one, answer "
-                f"column.{draft.key(one)}=none, or with its quantity",
+                "export nominal stress and strain of one pull or pressing; if each row is a reading of one, "
+                f"answer column.{draft.key(one)}=none, or with its quantity",
             )
     for name in ("strain", "displacement_mm"):
         read = draft.table.get(name)
@@ -161,7 +175,7 @@ def with_needed(draft: Proposal) -> Proposal:
             "export that column as well, choose another kind, or say with column.TITLE=QUANTITY and "
             "unit.TITLE=UNIT what a column holds",
         )
-    alone = len(unknown) == len(wanted) == 1
+    alone = len(draft.free) == len(wanted) == 1
     for k in unknown[:_MOST_ASKED]:
         draft = ask_column(draft, k, wanted, f", as {kind.name} needs {' and '.join(gone)}", alone)
     return draft

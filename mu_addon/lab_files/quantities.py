@@ -17,7 +17,9 @@ from .units import in_unit
 # A stretch at rest is 1, a strain 0, within this.
 _AT_REST = 0.1
 # Columns of one quantity are read in the order of the table, but these after others.
-_EXTREME = re.compile(r"\b(min|max|minimum|maximum|std|stdev)\b")
+_LAST = re.compile(
+    r"\b(min|max|minimum|maximum|std|stdev|peak|set|setpoint|target|desired|command|true|wahre|shear)\b|^soll"
+)
 
 
 def read_columns(draft: Proposal) -> Proposal:
@@ -69,7 +71,7 @@ def ask_column(
 def may_hold(draft: Proposal, k: int, quantities: Sequence[str]) -> bool:
     """Return True if a column that is not read may hold one of these quantities, by its unit."""
     one = draft.block.columns[k]
-    if draft.answer_on("column", one)[1] is not None or (one.quantity == "count" and one.unit):
+    if draft.answer_on("column", one)[1] is not None or one.quantity == "count":
         return False
     return unit_of(one.unit) is None or any(known_in(q, one.unit) is not None for q in quantities)
 
@@ -95,7 +97,7 @@ def _rank(held: tuple[int, Column]) -> tuple[bool, bool, bool, int]:
     return (
         one.unit == "clock" or (one.quantity == "force" and (unit_of(one.unit) or "")[:1] == ("g",)),
         one.quantity == "position",
-        _EXTREME.search(plain(one.title).replace("_", " ")) is not None,
+        _LAST.search(plain(one.title).replace("_", " ")) is not None,
         k,
     )
 

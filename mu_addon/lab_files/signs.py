@@ -42,9 +42,9 @@ def with_zero(draft: Proposal) -> Proposal:
 
 def with_signs(draft: Proposal) -> Proposal:
     """The loads with their signs; jumps of one column alone are named."""
-    if draft.kind not in LOADED:
-        return draft
     loads = {name: draft.columns[name] for name in _LOADS if name in draft.table}
+    if draft.kind not in LOADED or not loads:
+        return draft
     for name, values in loads.items():
         for row in _jumps(loads, name)[:_MOST_JUMPS]:
             words = f"jumps by {values[row] - values[row - 1]:.4g} at line {draft.lines[row]}"

@@ -46,7 +46,7 @@ _NO_NAMES = ("position", "pos", "center", "centroid", "coord", "image")
 _PIXELS = ("", "px", "pixel", "pixels")
 _IDS = (
     "track id", "particle", "track", "track n°", "trajectory", "marker", "bodypart", "name", "label",
-    "object", "id",
+    "object", "id", "tid", "marker id",
 )  # fmt: skip
 _FRAMES = ("frame", "frame idx", "frame id", "frame number", "frame nr", "frames", "slice", "slice n°")
 NO_MARKERS = "the file contains no tracked markers"
@@ -89,6 +89,9 @@ def read_pixels(path: Path) -> Tracks:
     This program's layout has `NAME right_px` and `NAME down_px`, one row a frame, empty if a marker was lost;
     time_s, if present, is the time of each. Tables of other trackers need x to the right and y downward.
     """
+    if path.suffix.lower() in PROJECTS:
+        remedy = "export the tracked positions in pixels as CSV"
+        raise InputError("the file is not a text table", str(path), remedy)
     text = text_in(path, "tracked markers", "check path and file", read=own_text)
     try:
         lines = _lines_of_kinovea(text, str(path)) if text.startswith(_KINOVEA) else own_lines(text)

@@ -16,14 +16,16 @@ from .proposal import NoExperiment, Proposal, Question
 from .sheet import Sheet
 from .source import read_sheets
 from .steps import answers_for, propose
-from .tracked_table import read_pixels
+from .tracked_table import NO_MARKERS, read_pixels
 
 # One answer for all of a file: its decimal sign.
 DECIMAL = "decimal"
 _INTERVAL = "interval_s"
-# Words of files whose pairs of x and y are positions, and of those where they are something else.
+# Words of files whose pairs of x and y are positions, of those that hold nothing else, and of other ones.
 _TRACKERS = re.compile(r"kinovea|bodyparts|\bmarker|track|trajector")
+_PLACES = re.compile(r"[(\[](px|pixels?)[)\]]|optitrack|naturalpoint|marker_names|pathfiletype")
 _NO_PLACES = re.compile(r"accel|\bacc\b|gyro|magnet|\bimu\b")
+_HEAD = 60
 
 
 @attrs.frozen
@@ -111,16 +113,20 @@ def _require_untracked(path: Path) -> None:
     try:
         names = read_pixels(path).names
     except InputError as error:
-        refused, remedy = error.what, f"; {error.remedy}"
-    shown = " ".join(" ".join(row.filled) for sheet in read_sheets(path) for row in sheet.rows[:8]).casefold()
+        refused, remedy = error.what, error.remedy
+    head = [row for sheet in read_sheets(path) for row in sheet.rows[:_HEAD]]
+    shown = " ".join(" ".join(row.filled) for row in head).casefold()
     by_name = (names or "not in pixels" in refused) and _TRACKERS.search(shown)
-    if _NO_PLACES.search(shown) or not (len(names) > 1 or "three axes" in refused or by_name):
+    places = len(names) > 1 or "three axes" in refused or by_name or _PLACES.search(shown)
+    if _NO_PLACES.search(shown) or not places:
         return
-    listed = ", ".join(names[:4]) or refused
+    listed = ", ".join(names[:4]) or (refused if refused != NO_MARKERS else "an export of motion capture")
     raise InputError(
         f"the file holds positions of tracked markers: {listed}",
         str(path),
-        f"`track {path.name} --markers bench.toml --pressure ladder.csv` makes an experiment of them{remedy}",
+        f"`track` takes them otherwise: {remedy}"
+        if remedy
+        else f"`track {path.name} --markers bench.toml --pressure ladder.csv` makes an experiment of them",
     )
 
 

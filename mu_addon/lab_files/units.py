@@ -71,7 +71,8 @@ def _likely(one: Column, values: Array) -> str:
         if _DATE.search(plain(one.title)) and ((values > _DAYS[0]) & (values < _DAYS[1])).all():
             return "d"
         # Boards count milliseconds and microseconds in whole numbers, clocks of computers whole seconds.
-        step = float(np.nanmedian(np.abs(np.diff(values)))) if len(values) > 1 else 0.0
+        steps = np.abs(np.diff(values[np.isfinite(values)]))
+        step = float(np.median(steps)) if len(steps) else 0.0
         whole = bool((values[np.isfinite(values)] % 1 == 0).all())
         return "us" if whole and step >= 1000 else "ms" if whole and step >= 5 else "s"
     wanted = READ_IN[one.quantity]

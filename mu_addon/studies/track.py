@@ -151,11 +151,8 @@ def tracks_in(clip: Path, bench: measured.Bench) -> measured.Tracks:
     if not clip.exists():
         remedy = "give a movie, or the first picture of a sequence"
         raise InputError("the clip does not exist", str(clip), remedy)
-    if clip.suffix.lower() in lab_files.SUFFIXES:
+    if clip.suffix.lower() in (*lab_files.SUFFIXES, *lab_files.PROJECTS):
         return lab_files.read_pixels(clip)
-    if clip.suffix.lower() in lab_files.PROJECTS:
-        remedy = "export the tracked positions in pixels as CSV"
-        raise InputError("the file is not a text table", str(clip), remedy)
     view = bench.view
     unplaced = {*view.base, *(view.tip or ()), *(view.ruler or ())} - {*bench.markers.pixels}
     if unplaced:

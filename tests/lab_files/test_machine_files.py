@@ -253,6 +253,31 @@ FILES = {
         many(lambda i: f"t:{i}\tPressure={i}.5\tAngle=-{i}", "boot"), LABELLED | PRESSED,
         {"pressure_kPa": 5950}, [],
     ),
+    "clock and labels": (
+        many(lambda i: f"2026-03-02 10:22:{i:02d}.5 Pressure: {i} kPa Angle: {2 * i} deg"), PRESSED,
+        {"time_s": 59, "pressure_kPa": 59, "angle_deg": 118}, [],
+    ),
+    "clock and >": (many(lambda i: f"10:22:{i:02d}.5 > {i},{2 * i}"), CLOCKED, {"angle_deg": 118}, []),
+    "tuples": (
+        many(lambda i: f"({20 * i}, {i}.5, {i})"), CLOCKED | {"column.1": "time", "unit.1": "ms"},
+        {"time_s": 1.18, "pressure_kPa": 59.5}, [],
+    ),
+    "JSON objects": (
+        many(lambda i: f'{{"t_ms": {100 * i}, "pressure_kPa": {i}, "angle_deg": -{i}.5}}'), PRESSED,
+        {"time_s": 5.9, "pressure_kPa": 59, "angle_deg": -59.5}, [],
+    ),
+    "set point before the reading": (
+        many(lambda i: f"{i};{2 * i};{i};{i}", "Zeit [s];Solldruck [bar];Istdruck [bar];Winkel [deg]"),
+        PRESSED, {"pressure_kPa": 5900}, ["another pressure: column 'Istdruck [bar]' is read"],
+    ),
+    "true before nominal": (
+        many(lambda i: f"{2 * i},{i},0.{i:02d}", "True stress (kPa),Stress (kPa),Strain [-]"), {},
+        {"stress_kPa": 59}, ["another stress"],
+    ),
+    "a letter that is no unit": (
+        many(lambda i: f"{i},{i},{i},0.{i}", "Time/min,Distance (mm),Force (N),D [d]"), {},
+        {"time_s": 3540, "displacement_mm": 59}, ["column 'D [d]'"],
+    ),
     "one column": (
         many(lambda i: f"{20 - 0.01 * i:.2f}", "# kPa"), HELD, {"time_s": 29.5, "pressure_kPa": 19.41}, [],
     ),
@@ -326,6 +351,10 @@ ASKED = {
     "only stress is left": (
         many(lambda i: f"1.{i:02d},{i}", "lambda [-],P [kPa]"), COUPON, [("column.P [kPa]", "stress")],
     ),
+    "no load": (
+        many(lambda i: f"{i},{i},{5 * i}", "Time (s),Rotation (deg),Torsion"), COUPON,
+        [("column.Torsion", "")],
+    ),
     "no section": (
         many(lambda i: f"{i},{i}", "strain [-],force [N]"), {"kind": "coupon", "mode": "uniaxial"},
         [("section_mm", "")],
@@ -339,11 +368,20 @@ ASKED = {
 @pytest.mark.parametrize("name", ASKED)
 def test_what_is_asked(tmp_path, name):
     text, answers, questions = ASKED[name]
-    assert [(q.key, q.proposed) for _, q in understood(tmp_path, text, answers).asked] == questions
+    found = understood(tmp_path, text, answers)
+    assert [(q.key, q.proposed) for _, q in found.asked] == questions
+    assert not any("negative" in words for p in found.proposals for words in p.concluded)
 
 
 REFUSED = {
     "one strain": (many(lambda i: f"0.1,{80 - i}", "Strain (%),Stress (kPa)"), "0.001 in every row"),
+    "rotation": (
+        many(lambda i: f"{i},{i},{i},{i}", "Time (s),Stress (Pa),Strain (%),Shear rate (1/s)"),
+        "test in shear",
+    ),
+    "torque": (many(lambda i: f"{i},{i}", "Rotation (deg),Torque (Nm)"), "no column is left"),
+    "shear": (many(lambda i: f"{i},{i}", "Shear strain [%],Shear stress [Pa]"), "is of shear"),
+    "true stress": (many(lambda i: f"0.{i:02d},{i}", "Strain [-],True stress (kPa)"), "true, not nominal"),
     "columns and decimals by commas": (
         many(lambda i: f"{i},5,{2 * i},5,0,{i:02d}", "Time,Load,Extension"),
         "commas separate columns as well.*line 2",
@@ -365,6 +403,13 @@ REFUSED = {
     "Kinovea's text": (
         many(lambda i: f"0.{i:02d} {100 + i} {i}", "#Kinovea Trajectory data export", "#T X Y"),
         "tracked markers: path 1",
+    ),
+    "a workbook's pixels": (
+        many(lambda i: f"{i},{100 + i},{i}", "Key images", "Name,X (px),Y (px)"), "positions of tracked",
+    ),
+    "a capture's own rows": (
+        many(lambda i: f"frame,{i},0.1,2,{i}", 'comment,"OptiTrack Export Data"'),
+        "an export of motion capture",
     ),
     "DeepLabCut": (
         many(lambda i: f"{i},{i},90,0.9", "scorer,n,n,n", "bodyparts,a,a,a", "coords,x,y,likelihood"),
@@ -795,6 +840,7 @@ def test_amplitudes_of_an_oscillation_are_no_curve(tmp_path, titles):
     [
         ('Strain : Tensile strain (Displacement) gauge length,"80.00000",mm', 80.0, None),
         ("Gauge length;80;mm\nWidth;10;mm\nThickness;2;mm", 80.0, [10.0, 2.0]),
+        ("Gauge length (cm),8.05\nWidth mm,10\nThickness mm,2.5", 80.5, [10.0, 2.5]),
         ("Gauge length [mm]: 80\nWidth [mm]: 10\nThickness [mm]: 2", 80.0, [10.0, 2.0]),
         ("Width,mm,10\nThickness,mm,2\nGauge length,cm,8", 80.0, [10.0, 2.0]),
         ("Specimen of width 10 mm, thickness 2 mm and gauge length 80 mm", 80.0, [10.0, 2.0]),
