@@ -66,7 +66,8 @@ def in_unit(draft: Proposal, one: Column, k: int) -> tuple[Proposal, Column]:
 def _likely(one: Column, values: Array) -> str:
     """The likely unit: of strain and of time by the size of the values; none beside an unknown one."""
     if one.quantity == "strain":
-        return "%" if np.nanmax(np.abs(values), initial=0) > 1.5 else "1"
+        # A stretch that is answered as a strain begins at 1.
+        return "%" if np.nanmax(np.abs(values - values[0]), initial=0) > 1.5 else "1"
     if one.quantity == "time":
         if _DATE.search(plain(one.title)) and ((values > _DAYS[0]) & (values < _DAYS[1])).all():
             return "d"

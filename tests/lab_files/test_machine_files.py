@@ -344,6 +344,10 @@ ASKED = {
         many(lambda i: f"1.{i:02d},{i}", "Strain [-],Stress [kPa]"), COUPON,
         [("column.Strain [-]", "stretch")],
     ),
+    "a stretch answered as strain": (
+        many(lambda i: f"{1 + i / 50},{i}", "Stretch,Stress [kPa]"), COUPON | {"column.Stretch": "strain"},
+        [("unit.Stretch", "1")],
+    ),
     "a minimum": (
         many(lambda i: f"{i},{i},4{i:02d}", "Reading,Force (N),Signal(Min)"), {},
         [("unit.Signal(Min)", ""), ("column.Reading", "")],
