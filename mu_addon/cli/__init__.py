@@ -10,36 +10,19 @@ from collections.abc import Callable
 from importlib import import_module
 from typing import Any, NamedTuple
 
-# In the order in which --help lists them, further studies after these; a module's name is its command's, with
-# _ for -, and a trailing _ for a keyword of Python.
-NAMES = (
-    "presets",
-    "design",
-    "check",
-    "export",
-    "specimens",
-    "simulate",
-    "place",
-    "resume",
-    "compare",
-    "sweep",
-    "optimize",
-    "graph",
-    "homogenize",
-    "grip",
-    "chain",
-    "fit_material",
-    "import_",
-    "track",
-    "diagnose",
-    "design_experiments",
-    "ports",
-    "stream",
-    "record",
-    "replay",
-    "calibrate",
-)
-
+_BY_PAGE = {
+    "design": ("presets", "design"),
+    "print": ("check", "export", "specimens"),
+    "simulate": ("simulate", "homogenize"),
+    "sense": ("place",),
+    "runs": ("resume", "compare"),
+    "search": ("sweep", "optimize", "graph"),
+    "assemblies": ("grip", "chain"),
+    "measure": ("fit-material", "import", "track", "diagnose", "design-experiments"),
+    "bench": ("ports", "stream", "record", "replay", "calibrate"),
+}
+PAGES = {name: page for page, names in _BY_PAGE.items() for name in names}
+"""Page of the guide on each command, in the order in which --help lists them; further studies come after."""
 
 _MODULES = dict.fromkeys(("ports", "record", "replay"), "stream")
 """Modules of commands that share one; each of its functions has its command's name, except a shared `run`."""
@@ -55,11 +38,10 @@ class Command(NamedTuple):
 def _command(name: str) -> Command:
     from ..studies import STUDIES, study
 
-    command = name.rstrip("_").replace("_", "-")
-    if command in STUDIES and (study(command).example or study(command).commands):
+    if name in STUDIES and (study(name).example or study(name).commands):
         from .studies import command_of
 
-        return Command(*command_of(command))
+        return Command(*command_of(name))
     module = import_module(f".{_MODULES.get(name, name)}", __name__)
     add, run = (getattr(module, f"{what}_{name}", None) or getattr(module, what) for what in ("add", "run"))
     return Command(add, run)
@@ -69,5 +51,5 @@ def all_commands() -> dict[str, Command]:
     """Every subcommand by its name; a study without an example is none."""
     from ..studies import STUDIES, study
 
-    found = {name.rstrip("_").replace("_", "-"): _command(name) for name in NAMES}
-    return found | {name: _command(name) for name in STUDIES if name not in found and study(name).example}
+    others = (name for name in STUDIES if name not in PAGES and study(name).example)
+    return {name: _command(name) for name in (*PAGES, *others)}

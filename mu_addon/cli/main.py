@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from .. import __version__
-from . import all_commands
+from . import PAGES, all_commands
 from .closed_pipe import leave_quietly, until_closed
 from .completion import SHELLS, Complete
 from .resume import KEPT
@@ -26,20 +26,6 @@ STATUSES = (
 
 # Options that are kept under another name than their own.
 _OPTIONS = {"wall_resin": "--resin", "obstacles": "--obstacle"}
-
-
-# The page of the guide on each command.
-PAGES = {
-    **dict.fromkeys(("presets", "design"), "design"),
-    **dict.fromkeys(("check", "export", "specimens"), "print"),
-    **dict.fromkeys(("simulate", "homogenize"), "simulate"),
-    **dict.fromkeys(("resume", "compare"), "runs"),
-    **dict.fromkeys(("sweep", "optimize", "graph"), "search"),
-    **dict.fromkeys(("grip", "chain"), "assemblies"),
-    **dict.fromkeys(("fit-material", "import", "track", "diagnose", "design-experiments"), "measure"),
-    **dict.fromkeys(("ports", "stream", "record", "replay", "calibrate"), "bench"),
-    "place": "sense",
-}
 
 
 class _Commands(argparse._SubParsersAction):

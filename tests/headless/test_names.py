@@ -6,8 +6,8 @@ from pathlib import Path
 import pytest
 
 import mu_addon
-from mu_addon.cli import all_commands
-from mu_addon.cli.main import PAGES, main
+from mu_addon.cli import PAGES, all_commands
+from mu_addon.cli.main import main
 
 ROOT = Path(mu_addon.__file__).parents[1]
 
