@@ -14,36 +14,11 @@ def tables(text):
     return blocks.tables(sheet_of_text(text)).blocks
 
 
-def test_bluehill():
-    (block,) = tables(exports.BLUEHILL)
-    assert [c.quantity for c in block.columns] == ["time", "displacement", "force"]
-    assert [c.unit for c in block.columns] == ["s", "mm", "N"]
-    assert block.facts["gauge length"] == ("40.0", "mm")
-    assert block.lines[[0, -1]].tolist() == [9, 8 + exports.ROWS]
-
-
-def test_testxpert_in_german_with_decimal_commas():
-    (block,) = tables(exports.TESTXPERT)
-    assert [c.quantity for c in block.columns] == ["time", "displacement", "force"]
-    assert block.values[:, 2] == pytest.approx(exports.N, abs=1e-5)
-    assert block.facts["probendicke a0"] == ("3,0", "mm")
-
-
-def test_trapezium_has_specimens_side_by_side():
-    one, two = tables(exports.TRAPEZIUM)
-    assert [one.label, two.label] == ["1 _ 1", "1 _ 2"]
-    assert two.values[:, 1] == pytest.approx(2 * one.values[:, 1], abs=1e-5)
-
-
 def test_mts_goes_on_with_one_record_after_each_header():
     (block,) = tables(exports.MTS)
     assert len(block.values) == exports.ROWS
     assert np.all(np.diff(block.values[:, 0]) > 0)
     assert block.columns[2].factor == 1000.0
-
-
-def test_horizon_has_specimens_one_below_the_other():
-    assert [block.label for block in tables(exports.HORIZON)] == ["Specimen 1", "Specimen 2"]
 
 
 def test_results_of_two_rows_are_no_record():

@@ -30,6 +30,7 @@ from mu_addon.fem.protocol import read_protocol
 from mu_addon.files import read_npz
 from mu_addon.grasp import read_phases
 from mu_addon.lab_files.tracked_table import read_pixels
+from mu_addon.lab_files.understood import understand
 from mu_addon.materials.library import read_material
 from mu_addon.measured import table
 from mu_addon.measured.bench import read_bench, read_pressure
@@ -43,6 +44,8 @@ from mu_addon.sensing.recording import read_recording
 from mu_addon.studies.chain import Chain
 from mu_addon.studies.inputs import path_of
 from mu_addon.usecases.parameter_study.plan import read_plan
+
+from ..lab_files.exports import BLUEHILL
 
 ASSETS = Path(__file__).parents[2] / "assets"
 
@@ -83,6 +86,7 @@ READERS: dict[str, tuple[Callable[[Path], Any], str | None]] = {
     ),
     "pressure": (read_pressure, "time_s,pressure_kPa\n0,0\n1,5\n"),
     "pixels": (read_pixels, None),
+    "import": (lambda path: understand([path], {"kind": "coupon"}), BLUEHILL),
     "gauge": (read_sheet, None),
     "paths": (lambda path: path_of(Unit(), str(path.rename(path.with_suffix(".csv")))), None),
     "folder": (lambda path: read_folder(_as(path, "experiments.toml")), None),

@@ -1,10 +1,8 @@
 """Files of test machines become folders of measured data, and nothing is guessed that they do not say."""
 
 import json
-import random
 import subprocess
 import sys
-from contextlib import suppress
 from pathlib import Path
 
 import numpy as np
@@ -216,39 +214,6 @@ def test_another_experiment_of_the_name_is_kept(tmp_path):
 def test_a_wrong_answer_is_refused(tmp_path, answers, words):
     with pytest.raises(InputError, match=words):
         understand([written(tmp_path, exports.PLAIN)], answers)
-
-
-def test_a_time_that_runs_backward_is_refused_with_its_line(tmp_path):
-    text = "Time (s),Extension (mm),Load (N)\n0,0,0\n1,1,1\n0.5,2,2\n3,3,3\n"
-    with pytest.raises(InputError) as caught:
-        understand([written(tmp_path, text)], COUPON)
-    assert caught.value.where.endswith("line 4")
-
-
-def test_damaged_files_end_in_a_clear_error(tmp_path):
-    random.seed(7)
-    sound = [exports.BLUEHILL, exports.TESTXPERT, exports.TRAPEZIUM, exports.MTS, exports.IMPERIAL]
-    answers = COUPON
-    read = 0
-    for _ in range(150):
-        data = bytearray(random.choice(sound).encode("cp1252"))
-        for _ in range(random.randint(1, 12)):
-            at = random.randrange(len(data))
-            way = random.randrange(4)
-            if way == 0:
-                data[at] = random.randrange(256)
-            elif way == 1:
-                del data[at : at + random.randint(1, 40)]
-            elif way == 2:
-                data[at:at] = bytes(random.randrange(256) for _ in range(random.randint(1, 9)))
-            else:
-                data[at:at] = random.choice([b";", b",", b"\n", b"1e999", b'"', b"\xff\xfe", b"-" * 50])
-        path = tmp_path / "damaged.csv"
-        path.write_bytes(bytes(data))
-        with suppress(InputError):
-            understand([path], answers)
-            read += 1
-    assert 0 < read < 150
 
 
 def test_the_command_line(tmp_path):
