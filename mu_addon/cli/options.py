@@ -198,39 +198,31 @@ def unit_if_named(options: argparse.Namespace) -> Unit | None:
     return None if options.preset is None and options.unit is None else unit_of(options)
 
 
-def modelled(options: argparse.Namespace, context: RunContext) -> tuple[Unit, NamedEffects]:
+def modelled(
+    options: argparse.Namespace, context: RunContext, whole: bool = True
+) -> tuple[Unit, NamedEffects]:
     """The unit with the extended model of --model applied, and its effects beyond a unit's parameters.
 
-    Warns of effects that no simulation of a unit supports.
+    whole: False where no whole unit is simulated, and parameters alone are applied. Warns of effects that the
+    simulation does not support.
     """
     import attrs
 
     from ..usecases.simulate_and_place.named_effects import NamedEffects
 
-    unit = unit_of(options)
-    turn = options.orientation
+    unit, turn = unit_of(options), options.orientation if whole else 0.0
     effects = NamedEffects(orientation_deg=turn, where="--orientation")
     if options.model is not None:
         from ..usecases.simulate_and_place.extended_unit import read_extended
 
-        found = _report_applied(read_extended(unit, options.model), options, context)
+        found = read_extended(unit, options.model)
+        found = _report_applied(found if whole else found.of_parameters(), options, context)
         unit, effects = found.unit, attrs.evolve(found.effects, orientation_deg=turn)
     if turn and not effects.has_gravity:
         context.progress.warning(
             "gravity is not part of this model, so the orientation has no effect", "--orientation"
         )
     return unit, effects
-
-
-def modelled_unit(options: argparse.Namespace, context: RunContext) -> Unit:
-    """The unit with the parameters of --model applied; warns of its other effects."""
-    unit = unit_of(options)
-    if options.model is None:
-        return unit
-    from ..usecases.simulate_and_place.extended_unit import read_extended
-
-    found = read_extended(unit, options.model).of_parameters()
-    return _report_applied(found, options, context).unit
 
 
 def _report_applied(found: Extended, options: argparse.Namespace, context: RunContext) -> Extended:

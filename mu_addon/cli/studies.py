@@ -18,7 +18,6 @@ from .options import (
     add_setting,
     add_unit,
     modelled,
-    modelled_unit,
     presets,
     require_out,
     sentence,
@@ -39,7 +38,7 @@ def _add_unit(command: Any, one: Any) -> None:
 
 def _unit(options: argparse.Namespace, context: RunContext, one: Any, values: dict[str, Any]) -> Any:
     if one.modelled and one.needed and not one.default:
-        return modelled_unit(options, context)
+        return modelled(options, context, whole=False)[0]
     from ..design.parameters import load_preset
 
     found = unit_if_named(options)

@@ -10,7 +10,7 @@ import pytest
 
 from mu_addon.body.printed_mesh import mesh_printed
 from mu_addon.cli.main import main, parser
-from mu_addon.cli.options import modelled, modelled_unit
+from mu_addon.cli.options import modelled
 from mu_addon.design import shapes
 from mu_addon.design.body import body_of
 from mu_addon.design.parameters import load_preset, to_toml
@@ -313,31 +313,31 @@ def test_the_command_line_simulates_what_a_diagnosis_found(tmp_path, capsys, mes
     assert "not applied" not in capsys.readouterr().out
 
 
-def given(unit_of, *words):
+def given(*words, whole=True):
     """What a command makes of its options --preset and --model, its summary, and what it warns of."""
     messages = []
     options = parser().parse_args([str(w) for w in [*words, "--preset", "mu-1.0x", "--out", "out"]])
     with run_to_end(Progress([messages.append])) as context:
-        found = unit_of(options, context)
+        found = modelled(options, context, whole)
     assert context.status == 0, messages[-1]
     return found, context.summary, [m["what"] for m in messages if m.get("type") == "warning"]
 
 
 def test_a_direction_of_nothing_that_weighs_is_told(tmp_path):
     path = model_file(tmp_path / "model.toml", clogged_chamber=0.3)
-    (unit, effects), _, warned = given(modelled, "simulate", "--model", path, "--orientation", "90")
+    (unit, effects), _, warned = given("simulate", "--model", path, "--orientation", "90")
     assert unit == UNIT
     assert effects.tables == {"effects": named(clogged_chamber=0.3)}
     assert warned == ["gravity is not part of this model, so the orientation has no effect"]
     path = model_file(tmp_path / "model.toml", gravity=1000.0)
-    (_, effects), _, warned = given(modelled, "place", "--model", path, "--orientation", "90")
+    (_, effects), _, warned = given("place", "--model", path, "--orientation", "90")
     assert effects == NamedEffects(named(gravity=1000.0), 90.0)
     assert not warned
 
 
 def test_homogenize_says_that_it_knows_no_whole_unit(tmp_path):
     path = model_file(tmp_path / "model.toml", gravity=1300.0)
-    unit, summary, (warned,) = given(modelled_unit, "homogenize", "--model", path)
+    (unit, _), summary, (warned,) = given("homogenize", "--model", path, whole=False)
     assert unit == UNIT
     assert "1300 kg/m³: only `simulate` and `place` simulate the whole unit" in warned
     assert summary["model"]["applied"] == ()
