@@ -79,7 +79,7 @@ def short(number: str | float) -> str:
 def placed(words: list[str], out: Path) -> tuple[Rows, dict, tuple[float, float]]:
     """Rows of deviation.csv by path, summary, and the command's seconds of the processor and by the clock."""
     begun, used = time.perf_counter(), _used_s()
-    subprocess.run([sys.executable, str(RUN), *words], check=True)
+    subprocess.run([sys.executable, str(RUN), *words], check=True, stdout=subprocess.DEVNULL)
     seconds = _used_s() - used, time.perf_counter() - begun
     with (out / "deviation.csv").open(newline="", encoding="utf-8") as stream:
         rows = {row["path"]: row for row in csv.DictReader(stream)}
