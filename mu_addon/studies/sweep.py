@@ -64,7 +64,7 @@ class PlanInput(Input):
         more = {"stages": last[0] if last else STAGES[0]} | ({"points": counts[-1]} if counts else {})
         files = Path(str(found.run.get("files", folder)))
         document = attrs.evolve(table, values=keys | more)
-        return planned(document, lambda file: design.read_unit(folder / UNIT), files, counts)
+        return planned(document, design.read_unit(folder / UNIT), files, counts)
 
     def file_names(self, name: str) -> tuple[str, ...]:
         """Its files."""

@@ -201,7 +201,7 @@ def every_kind(wall, bench):
     add("Angle", "figure", {"study": "Move.study"})
     add("Number", "number", value=0.05)
     add("Scaled", "calculate", {"a": "Angle.number", "b": "Number.number"}, operation="multiply")
-    add("Moduli", "homogenize", {"unit": "U.unit"}, specimen="none", refine=0.5)
+    add("Moduli", "homogenize", {"unit": "U.unit"}, friction="none", refine=0.5)
     add("Check", "check", {"unit": "U.unit"})
     add("Export", "export", {"unit": "U.unit"}, formats="stl txt", quality="interactive")
     add("Data", "data", folder=str(ROOT / "assets" / "examples" / "paper-moduli"))
@@ -217,8 +217,8 @@ def every_kind(wall, bench):
         "Lighter", "optimize", {"unit": "U.unit", "model": "Cause.model"}, file=str(bench / "design.toml"),
     )  # fmt: skip
     add(
-        "Two", "chain", {"units": "U.unit"}, copies=2, turns_deg="0 90", reach_mm="0 -2 110", high_kPa=20.0,
-        step_kPa=50.0, loaded=False, refine=0.25,
+        "Two", "chain", {"units": "U.unit"}, copies=2, turns_deg="0 90", reach="0 -2 110", high_kPa=20.0,
+        pressure_step_kPa=50.0, loaded=False, refine=0.25,
     )  # fmt: skip
     add("Heaviest", "best", {"table": "Study.table"}, figure="mass_g")
     angles = str(ROOT / "assets" / "examples" / "bench" / "angles.csv")

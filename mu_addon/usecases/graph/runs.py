@@ -5,24 +5,20 @@ from __future__ import annotations
 import shutil
 from contextlib import suppress
 from pathlib import Path
-from typing import Any
 
 import attrs
 
-from ...errors import InputError, MuError
+from ...errors import MuError
 from ...files import make_folder
 from ...graph.evaluation import Finished, Order
 from ...graph.records import FOLDER
-from ...reading import file_bytes, parse_json
 from ...run.context import run_to_end
 from ...run.folder import same_inputs
 from ...run.progress import Message, Progress, Sink
-from ...run.summary import SUMMARY
+from ...run.summary import SUMMARY, read_summary
 from ...studies.starting import start
 
 CACHE = "cache"
-# Far more than any summary holds.
-_LONGEST = 1 << 26
 # Exit statuses of a run that was asked to stop.
 _STOPPED = (130, 143)
 
@@ -45,7 +41,7 @@ class FolderRuns:
     def find(self, order: Order) -> Finished | None:
         """Find the run in its folder, complete and with the same inputs."""
         place = self.place(order)
-        summary = _summary(place)
+        summary = read_summary(place / SUMMARY)
         if not order.is_done(summary) or not order.study.layout().is_of(place):
             return None
         found = Finished(place, summary, order.study)
@@ -61,7 +57,7 @@ class FolderRuns:
         with run_to_end(inner) as context, inner.beating():
             context.wants_report = self.reports
             start(order.study, place, context)
-        summary = _summary(place)
+        summary = read_summary(place / SUMMARY)
         stopped = context.status in _STOPPED
         if context.status and (stopped or not order.is_done(summary)):
             message = errors[-1] if errors else {}
@@ -107,12 +103,3 @@ def _of_node(node: str, progress: Progress, errors: list[Message]) -> Sink:
             progress.emit({**message, "what": f"{node}: {message['what']}"})
 
     return sink
-
-
-def _summary(folder: Path) -> dict[str, Any]:
-    """Summary of a run's folder, empty where none can be read."""
-    try:
-        found = parse_json(file_bytes(folder / SUMMARY, _LONGEST), SUMMARY)
-    except (OSError, InputError):
-        return {}
-    return found if isinstance(found, dict) else {}

@@ -44,7 +44,7 @@ def plan_of(call: Call) -> Plan:
         **({"simulate": simulate} if s["stages"] != STAGES[0] else {}),
         "vary": dict(ranges),
     }
-    return planned(TomlTable(keys, call.node), lambda file: design.unit, _NOWHERE)
+    return planned(TomlTable(keys, call.node), design.unit, _NOWHERE)
 
 
 def best_of(call: Call) -> Outputs:

@@ -89,14 +89,14 @@ class Plan:
     variables: tuple[Variable, ...]
     folder: Path
     method: str = METHOD.field()
-    count: int = POINTS.field()
+    points: int = POINTS.field()
     seed: int = SEED.field()
     memory_MB: int = MEMORY.field()
     minutes: float = MINUTES.field()
     resin: str = RESIN.field()
     minimize: tuple[str, ...] = ()
     maximize: tuple[str, ...] = ()
-    counts: tuple[int, ...] = attrs.field(default=attrs.Factory(lambda self: (self.count,), takes_self=True))
+    counts: tuple[int, ...] = attrs.field(default=attrs.Factory(lambda self: (self.points,), takes_self=True))
 
     _errors: dict[int, MuError | None] = attrs.field(factory=dict, init=False, repr=False)
 
@@ -180,7 +180,7 @@ class Plan:
             same = all(document.values.get(name) == getattr(self, name) for name in ("method", "seed"))
             if same and list(document.inner("vary").values) == [v.name for v in self.variables]:
                 counts = counts_of(run.get("points"), str(file))
-        count = (counts[-1] if counts and add else max([self.count, *counts])) + add
+        count = (counts[-1] if counts and add else max([self.points, *counts])) + add
         return attrs.evolve(self, counts=counts if counts[-1:] == (count,) else (*counts, count))
 
     @property
@@ -193,28 +193,6 @@ class Plan:
             **self.inputs.tables,
             "vary": {v.name: v.table for v in self.variables},
         }
-
-
-_OWN = ("method", "seed", "memory_MB", "minutes", "resin", "minimize", "maximize")
-"""Keys of sweep.toml that the plan has as they are."""
-
-
-@attrs.frozen
-class _File:
-    """The plain keys of sweep.toml."""
-
-    preset: str = ""
-    unit: str = ""
-    protocol: str = ""
-    resin: str = RESIN.field()
-    stages: str = LAST_STAGE.field()
-    method: str = METHOD.field()
-    points: int = POINTS.field()
-    seed: int = SEED.field()
-    memory_MB: int = MEMORY.field()
-    minutes: float = MINUTES.field()
-    minimize: tuple[str, ...] = ()
-    maximize: tuple[str, ...] = ()
 
 
 def read_plan(path: Path) -> Plan:
@@ -236,15 +214,17 @@ def _plan_of(document: TomlTable, folder: Path) -> Plan:
     if len(given) != 1:
         remedy = 'write preset = "mu-1.0x" or unit = "my-unit.toml"'
         raise InputError("no unit is given", document.at(), remedy)
-
-    def unit(file: _File) -> Unit:
-        return load_preset(file.preset) if file.preset else read_unit(folder / file.unit)
-
+    named = document.word(given[0])
+    unit = load_preset(named) if given[0] == "preset" else read_unit(folder / named)
     return planned(attrs.evolve(document, values=keys), unit, folder)
 
 
-def planned(document: TomlTable, unit: Any, files: Path, counts: tuple[int, ...] = ()) -> Plan:
-    """The plan of sweep.toml's keys; unit: its unit, or what gives it of the plain keys. Raises InputError.
+_OWN = ("method", "points", "seed", "memory_MB", "minutes", "resin", "minimize", "maximize")
+"""Keys of sweep.toml that the plan has as they are."""
+
+
+def planned(document: TomlTable, unit: Unit, files: Path, counts: tuple[int, ...] = ()) -> Plan:
+    """The plan of sweep.toml's keys for a unit. Raises InputError.
 
     files: folder of the files that it names; counts: numbers of points by which an earlier run grew.
     """
@@ -252,19 +232,19 @@ def planned(document: TomlTable, unit: Any, files: Path, counts: tuple[int, ...]
     if not vary.values:
         remedy = 'add [vary] and lines like "chambers.wall_mm" = { low = .., high = .. }'
         raise InputError("no input is varied", document.at(), remedy)
-    plain = {k: v for k, v in document.values.items() if k not in ("vary", *STAGES)}
-    file = attrs.evolve(document, values=plain).made(_File)
-    stages = STAGES[: STAGES.index(file.stages) + 1]
+    document.only((*_OWN, "preset", "unit", "protocol", "stages", "vary", *STAGES))
+    stages = STAGES[: STAGES.index(document.word("stages", STAGES, LAST_STAGE.default)) + 1]
     for name in STAGES:
         if name in document and name not in stages:
             remedy = f'write stages = "{name}", or leave it out'
             raise InputError(f"[{name}] is not one of its stages", document.at(name), remedy)
     settings = {name: _settings(document.inner(name)) for name in stages}
     variables = tuple(variable(name, table) for name, table in _flat(vary).items())
-    protocol = protocol_of(files / file.protocol if file.protocol else None)
-    inputs = Inputs(unit(file), protocol, settings)
-    own = {name: getattr(file, name) for name in _OWN}
-    plan = Plan(inputs, variables, files, count=file.points, counts=counts or (file.points,), **own)
+    protocol = document.take("protocol", str, "")
+    inputs = Inputs(unit, protocol_of(files / protocol if protocol else None), settings)
+    own = attrs.evolve(document, values={k: v for k, v in document.values.items() if k in _OWN})
+    counts = counts or (document.take("points", int, POINTS.default),)
+    plan = own.made(Plan, inputs=inputs, variables=variables, folder=files, counts=counts)
     # A setting that is wrong for every point is reported before any work, and not as many failures.
     tables = {name: attrs.evolve(document.inner(name), values=table) for name, table in settings.items()}
     UnitStudy.of_tables(tables, Path(document.origin), unit=inputs.unit, protocol=inputs.protocol, workers=1)
