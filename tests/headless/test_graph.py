@@ -209,7 +209,9 @@ def every_kind(wall, bench):
     add("As Measured", "simulate", {"unit": "U.unit", "model": "Cause.model"}, **COARSE)
     add("Compare", "compare", {"items": ["Move.study", "As Measured.study"]})
     add("Wall", "obstacle", file=str(wall), friction=0.3)
-    add("Gripper", "gripper", {"unit": "U.unit"})
+    # A short path begins at the inlet, where the plate would cover its seat.
+    add("Finger", "unit", parameters="format = 1\n[chambers]\ncount = 3\n[waveguide]\nseats = false\n")
+    add("Gripper", "gripper", {"unit": "Finger.unit"}, path="alpha1")
     add("Grasp", "grip", {"gripper": "Gripper.gripper"}, coarse=True, cubes_mm="20")
     add("Thin Or Thick", "range", values="0.8 1.0")
     add("Study", "sweep", {"unit": "U.unit", "ranges": "Thin Or Thick.range"}, stages="design", workers=1)

@@ -45,7 +45,6 @@ OTHERWISE = {
     "placement/search.py": {"batch"},  # of paths
     "sensing/calibration.py": {"dark"},  # subtracted already
     "studies/unit_motion.py": {"self_contact"},  # of a call, which may be quick
-    "usecases/parameter_study/plan.py": {"protocol"},  # a file
     "usecases/parameter_study/point.py": {"memory_MB", "seconds"},  # that a study took
     "usecases/graph/studies.py": {"protocol"},
 }

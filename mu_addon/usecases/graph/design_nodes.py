@@ -15,6 +15,7 @@ from ...design.steps import STEPS, Path, Stack, Step, Struts, TrimmedStruts
 from ...design.waveguide import Bar
 from ...errors import InputError
 from ...graph.definition import FILE, Call, Definition, Input, Output, Outputs, Setting, setting
+from .late import of_orders
 from .parts import (
     SCALE,
     Design,
@@ -27,7 +28,6 @@ from .parts import (
     rest,
     whole_unit,
 )
-from .shared_settings import of_orders
 
 STACK = Stack()
 """Values of the steps of every tree in this process."""

@@ -12,13 +12,13 @@ from ...design.gates import GateError
 from ...errors import InputError
 from ...graph.definition import FILE, Call, Definition, Input, Output, Outputs, Setting, setting
 from ...graph.evaluation import Finished, Order
+from ...meshing.settings import REFINE, SELF_CONTACT
 from ...run.study import Input as Asked
 from ...run.study import Node, Study
 from ...studies import study
 from ..parameter_study import settings as sweep
-from ..simulate_and_place.settings import ORIENTATION
+from ..simulate_and_place import settings as motion
 from .parts import refuse_body
-from .shared_settings import PROTOCOL, QUICK_REFINE, QUICK_TIMES, SELF_CONTACT, SELF_FRICTION
 
 REMARK = "remark"
 MUTED = "this node and those that need it are not computed"
@@ -53,7 +53,7 @@ def _effects(call: Call, one: Any, values: dict[str, Any]) -> Any:
     from ..simulate_and_place.extended_unit import read_extended
     from ..simulate_and_place.named_effects import NamedEffects
 
-    effects, turn = NamedEffects(where=call.node), call.settings[ORIENTATION.name]
+    effects, turn = NamedEffects(where=call.node), call.settings[motion.ORIENTATION.name]
     if call.inputs["model"] is not None:
         found = read_extended(values["unit"], call.inputs["model"])
         # The model changes the unit's parameters, too.
@@ -131,7 +131,7 @@ LINKED = {
         Input("calibration", ("calibration",), "link a node Calibrate or Calibration"), Path
     ),
     "model": _linked(MODEL, _model),
-    "effects": Linked((MODEL,), (Setting(ORIENTATION),), _effects),
+    "effects": Linked((MODEL,), (Setting(motion.ORIENTATION),), _effects),
     "obstacles": Linked(
         (Input("obstacles", ("obstacle",), "link nodes Obstacle", needed=False, many=True),),
         value=_obstacles,
@@ -177,11 +177,12 @@ LINKED = {
             Setting(sweep.METHOD._replace(default=sweep.GRID)),
             Setting(sweep.POINTS),
             Setting(sweep.SEED),
-            PROTOCOL,
-            QUICK_TIMES,
-            QUICK_REFINE,
-            SELF_CONTACT,
-            SELF_FRICTION,
+            Setting(motion.PROTOCOL, FILE),
+            # Many studies are coarse ones.
+            Setting(motion.TIMES._replace(default=7)),
+            Setting(REFINE._replace(default=0.5)),
+            Setting(SELF_CONTACT),
+            Setting(motion.SELF_FRICTION),
             setting("minimize", "", "columns of the table to minimise, for Pareto fronts"),
             setting("maximize", "", "columns of the table to maximise"),
             *map(Setting, (sweep.MEMORY, sweep.MINUTES)),

@@ -9,8 +9,8 @@ from ...design.rigid_body import RigidBody
 from ...design.settings import FRICTION
 from ...errors import InputError
 from ...graph.definition import FILE, Call, Definition, Input, Output, Outputs, Setting, setting
+from .late import of_orders
 from .parts import refuse_body
-from .shared_settings import of_orders
 from .studies import UNIT, node_of
 
 SIMULATE, PLACE, PRINT, GRASP = "Simulate", "Sensor", "Print", "Gripper"

@@ -5,8 +5,8 @@ from __future__ import annotations
 from ...errors import InputError
 from ...graph.definition import Call, Definition, Input, Output, Outputs, setting
 from ...meshing.settings import OF_CONTINUUM
+from .late import GOALS, of_orders
 from .parts import described
-from .shared_settings import GOALS, of_orders
 from .studies import node_of
 
 STUDY = "Parameter Study"

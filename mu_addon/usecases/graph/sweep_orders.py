@@ -11,8 +11,8 @@ from ...toml_reader import TomlTable
 from ..parameter_study.plan import Plan, planned
 from ..parameter_study.variable import changed_inputs
 from ..simulate_and_place.settings import STAGES
+from .late import GOALS
 from .parts import Design, refuse_body
-from .shared_settings import GOALS
 
 # Such a plan names no file: its folder decides nothing, and is the same everywhere.
 _NOWHERE = Path("/")
