@@ -391,6 +391,7 @@ def test_a_direction_is_beaten_by_one_that_is_as_good_in_all_and_better_in_one()
     order = ranked([beaten, small, few, cupless])
     assert [b.cup_ml for b in order] == [0.0, 6.0, 6.0, 9.0]
     assert [b.best_among for b in order] == [True, True, False, True]
+    assert way(6.0, 5, 198.0).costs == few.costs, "supports count in steps of 5 mm2"
 
 
 def test_a_part_may_be_turned_about_the_vertical_to_fit():
