@@ -175,7 +175,7 @@ def _main(arguments: list[str]) -> int:
         if given := {name: getattr(options, name) for name in KEPT if hasattr(options, name)}:
             context.summary["options"] = given
         context.short_report = _short_report
-        context.words = tuple(word for word in arguments if word not in ("--json", "--quiet"))
+        context.repeats = True
         with context.progress.beating():
             command.run(options, context)
     if context.status == 0 and not getattr(options, "json", False):

@@ -60,8 +60,8 @@ class RunContext:
     report: writes the report of the results so far; its argument is the reason of an early stop, else "".
     short_report: writes a report quickly from a folder, with the reason of a requested stop. wants_report:
     False to write no report. hurried: the user or the parent process waits for the run to stop.
-    console_summary: makes the last lines at a terminal from the summary. words: the command's, if it may
-    end at once where nothing has changed (`run.unchanged`).
+    console_summary: makes the last lines at a terminal from the summary. repeats: it may end at once where
+    nothing has changed (`run.unchanged`).
     """
 
     progress: Progress
@@ -73,7 +73,7 @@ class RunContext:
     wants_report: bool = True
     hurried: bool = False
     console_summary: Callable[[dict[str, Any]], list[str]] = lambda summary: []
-    words: tuple[str, ...] | None = None
+    repeats: bool = False
     _lock: FolderLock | None = None
     _kept_s: float = 0.0
 

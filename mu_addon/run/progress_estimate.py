@@ -144,6 +144,7 @@ class ProgressEstimate:
         if message.get("state") == "end":
             self._taken[stage] = self._spent
             self._share, self._own_left, self._by_itself = 1.0, 0.0, False
+            self.why = self.why.replace(f"{stage} takes", f"{stage} took")
         self._estimate(added)
 
     def _tell_part(self, stage: str, message: Mapping[str, Any]) -> None:
@@ -218,8 +219,9 @@ class ProgressEstimate:
             if left <= LONGER * shown + SLACK_S:
                 self._forget_reason(shown)
                 return
-            longer = f"{self._waits_for or self._stage} takes longer than expected"
-            self.why = f"{added} was added" if added else longer
+            waited = self._waits_for or self._stage
+            takes = "took" if waited in self._taken else "takes"
+            self.why = f"{added} was added" if added else f"{waited} {takes} longer than expected"
             self._grown_from, self._grown_at = shown, self._clock()
         else:
             self._forget_reason(left)

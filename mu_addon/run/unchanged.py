@@ -1,7 +1,7 @@
-"""A command given again ends at once where its inputs, its results and this program are as they were.
+"""A run begun again ends at once where its inputs, its results and this program are as they were.
 
 What a run leaves is told by the digests of its folder's files, inputs among them; a file that was edited,
-removed or added makes the command a run again, which takes finished stages from its cache.
+removed or added makes it a run again, which takes finished stages from its cache.
 """
 
 from __future__ import annotations
@@ -19,6 +19,7 @@ from ..reading import file_bytes, parse_json
 from .context import RunContext
 from .folder import ALWAYS, OWN
 from .progress import Message
+from .study import Study
 from .versions import package_versions
 
 FILE = "finished.json"
@@ -27,15 +28,15 @@ CACHE = "cache"
 MOST_BYTES = 400_000_000
 
 
-def finished(folder: Path, context: RunContext) -> dict[str, Any] | None:
-    """Record of the command's last complete run in a claimed folder; None if anything differs."""
-    if context.words is None:
+def finished(folder: Path, job: Study, context: RunContext) -> dict[str, Any] | None:
+    """Record of a job's last complete run in a claimed folder; None if anything differs."""
+    if not context.repeats:
         return None
     with suppress(OSError, InputError):
         found = parse_json(file_bytes(folder / CACHE / FILE), FILE)
         # A damaged record is none.
         whole = isinstance(found, dict) and found.keys() == {"asked", "files", "summary", "lines", "warnings"}
-        if whole and found["asked"] == _asked(context) and found["files"] == _digests(folder):
+        if whole and found["asked"] == _asked(job, context) and found["files"] == _digests(folder):
             return dict(found)
     return None
 
@@ -49,14 +50,14 @@ def tell(before: Mapping[str, Any], context: RunContext) -> None:
     context.console_summary = lambda summary: lines
 
 
-def remember(folder: Path, context: RunContext, warnings: Sequence[Message]) -> None:
+def remember(folder: Path, job: Study, context: RunContext, warnings: Sequence[Message]) -> None:
     """Record a run that is complete; a record that cannot be written is none."""
-    if context.words is None:
+    if not context.repeats:
         return
     with suppress(OSError, MuError):
         make_folder(folder / CACHE)
         record = {
-            "asked": _asked(context),
+            "asked": _asked(job, context),
             "files": _digests(folder),
             "summary": plain(context.summary | {"seconds": context.seconds}),
             "lines": context.console_summary(context.summary),
@@ -65,11 +66,12 @@ def remember(folder: Path, context: RunContext, warnings: Sequence[Message]) -> 
         write_json(folder / CACHE / FILE, record)
 
 
-def _asked(context: RunContext) -> list[Any]:
-    """The command's words, the packages' versions, and the newest of this program's files."""
+def _asked(job: Study, context: RunContext) -> list[Any]:
+    """What no file of inputs says: targets, options; and packages' versions, the program's newest file."""
     package = Path(__file__).parents[1]
     newest = max(path.stat().st_mtime_ns for path in package.rglob("*.py"))
-    return [list(context.words or ()), package_versions(), newest]
+    options = context.summary.get("options")
+    return [list(job.wanted_targets), options, package_versions(), newest]
 
 
 def _files(folder: Path) -> Iterator[Path]:

@@ -35,16 +35,16 @@ def start(job: Study, folder: Path, context: RunContext) -> Any:
     require_memory()
     if job.joins or job.streams:
         # Every run is made anew; a joined folder stays as it is until the first file.
-        context.words = None
+        context.repeats = False
     if not job.joins:
         begin_study(job, folder, context)
-    if (before := unchanged.finished(folder, context)) is not None:
+    if (before := unchanged.finished(folder, job, context)) is not None:
         return unchanged.tell(before, context)
     warnings: list[Message] = []
     context.progress.sinks.append(lambda m: warnings.append(m) if m["type"] == "warning" else None)
     found = job.work(folder, context) if job.streams else _execute(job, folder, context)
     context.write_report()
-    unchanged.remember(folder, context, warnings)
+    unchanged.remember(folder, job, context, warnings)
     return found
 
 

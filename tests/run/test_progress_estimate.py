@@ -56,6 +56,14 @@ def test_a_longer_time_says_why_and_a_little_longer_one_is_not_told():
     # The report at Model A's pace, 30 s for 6.6, weighted by these 6.6 of the 8 s that make it sure.
     assert run.seconds_left == pytest.approx(240.0 + 10.0 * (1.0 + 6.6 / 8.0 * (30.0 / 6.6 - 1.0)))
     assert run.why == "Model A takes longer than expected"
+    ended, _ = estimate()
+    for share, seconds, left, state in (
+        (0.1, 6.0, 54.0, "run"),
+        (0.11, 30.0, 240.0, "run"),
+        (1.0, 99.0, 0.0, "end"),
+    ):
+        ended.tell(message("Model A", share, seconds, left, state))
+    assert ended.why == "Model A took longer than expected"
     clock.now += SHOWN_S
     run.tell(message("Model A", 0.5, 45.0, 45.0))
     assert run.seconds_left == 60.0, "the report at Model A's pace, too"
