@@ -1,10 +1,5 @@
 """Files of test machines become folders of measured data, and nothing is guessed that they do not say."""
 
-import json
-import subprocess
-import sys
-from pathlib import Path
-
 import numpy as np
 import pytest
 
@@ -19,7 +14,6 @@ from mu_addon.studies.starting import start
 from ..lab_files import exports
 from ..lab_files.test_cells import workbook
 
-ROOT = Path(__file__).resolve().parents[2]
 # What no export of a coupon says.
 COUPON = {"kind": "coupon", "mode": "uniaxial", "section_mm": "12.5x3", "length_mm": "40"}
 
@@ -214,18 +208,3 @@ def test_another_experiment_of_the_name_is_kept(tmp_path):
 def test_a_wrong_answer_is_refused(tmp_path, answers, words):
     with pytest.raises(InputError, match=words):
         understand([written(tmp_path, exports.PLAIN)], answers)
-
-
-def test_the_command_line(tmp_path):
-    path = written(tmp_path, exports.PLAIN)
-    run = [sys.executable, str(ROOT / "headless/run.py"), "import", str(path), "--out", str(tmp_path / "out")]
-    asked = subprocess.run(run, capture_output=True, text=True, check=False, stdin=subprocess.DEVNULL)
-    assert asked.returncode == 2
-    assert "--set unit.Kraft=N" in asked.stderr
-    answers = COUPON | {"unit.Weg": "mm", "unit.Kraft": "N"}
-    given = [word for key, value in answers.items() for word in ("--set", f"{key}={value}")]
-    done = subprocess.run([*run, *given], capture_output=True, text=True, check=False)
-    assert done.returncode == 0, done.stderr
-    summary = json.loads((tmp_path / "out/summary.json").read_text())
-    assert summary["experiments"]["one"]["not_read"] == ["column 'Nr': not a quantity that is read"]
-    assert modulus_kPa(read_folder(tmp_path / "out").experiments[0]) == pytest.approx(2500.0, rel=1e-4)
