@@ -350,8 +350,9 @@ def _left(message: Message, before: str) -> str:
     # Shorter stages need no display, and would leave it standing.
     if left is None or left < 1.0:
         return ""
-    why = f" ({message['why']})" if message.get("why") else ""
-    return f"{before}{spell(left)} left{why}"
+    # The stage in question has its name in front.
+    why = message.get("why", "").removeprefix(f"{message['stage']} ")
+    return f"{before}{spell(left)} left" + (f" ({why})" if why else "")
 
 
 def _formatted(message: Message) -> str:
