@@ -280,6 +280,9 @@ class _Finding:
                 continue
             if not (_is_titles(row) or (self.fewest == 1 and _known(row))):
                 within = self.numeric[k] & self.usual
+                if len(row.filled) == len(found) == 1 and _is_units(found[0]):
+                    # A remark between titles and units.
+                    continue
                 if found or len(damaged) == _MOST_BETWEEN or not (within or len(row.filled) == 1):
                     break
                 damaged.insert(0, row)

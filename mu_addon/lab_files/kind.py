@@ -93,6 +93,7 @@ def with_kind(draft: Proposal) -> Proposal:
 
 def _loading(draft: Proposal) -> Proposal:
     """Kind of loading, tension of a specimen or compression of a lattice, by the file's text."""
+    require_curve(attrs.evolve(draft, kind=LOADED[0]))
     block = draft.block
     words = " ".join(
         [draft.file.stem, block.sheet, block.label, *(c.title for c in block.columns)]

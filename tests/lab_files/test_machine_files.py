@@ -181,6 +181,10 @@ FILES = {
         table(lambda row, i: row + ",,", "Time,Load,Extension,,10 mm/min", "(s),(N),(mm),,20 N preload"), {},
         READ, ["10 mm/min"],
     ),
+    "a remark between titles and units": (
+        table(lambda row, i: "," + row, "Data:,Time,Load,Extension", ",,mean,", ",s,N,mm"), {}, READ,
+        [],
+    ),
     "titles in a comment": (
         table(lambda row, i: row.replace(",", " "), "# time_s force_N displacement_mm"), {}, READ, [],
     ),
@@ -831,8 +835,9 @@ def test_amplitudes_of_an_oscillation_are_no_curve(tmp_path, titles):
     text = lines(
         titles, "Hz,\u00b0C,%,kPa,kPa", *(f"1,{25 + i},0.{i:02d}1,{80 - i},{80 - i}" for i in range(40))
     )
-    with pytest.raises(InputError, match="oscillation"):
-        understood(tmp_path, text)
+    for answers in ({}, COUPON):
+        with pytest.raises(InputError, match="oscillation"):
+            understood(tmp_path, text, answers)
     said = {f"column.{titles.split(',')[k]}": "none" for k in (0, 4)}
     if "Oscillation" in titles:
         said |= {"column.Oscillation strain": "strain", "column.Oscillation stress": "stress"}
