@@ -21,6 +21,10 @@ _BLOCK = 20_000
 _NEIGHBOURS = 16
 # A smaller Newton step in reference coordinates is not followed by another.
 _SETTLED = 1e-9
+# Of elements that a point lies in or near to equally, to within this in reference coordinates or mm, the one
+# with the nearest middle is taken, then the first: beyond them each continues the displacement in its own way,
+# and rounding is not the same in every library.
+_ALIKE = 1e-9
 
 
 @attrs.frozen(eq=False)
@@ -181,8 +185,10 @@ def _elements(mesh: Mesh, points: Array) -> tuple[Array, Array]:
                 at[bent] = _inverted(nodes[tet[bent]], points[point[bent]], at[bent])
                 depth[bent] = _barycentric(at[bent]).min(axis=1)
             # Where elements meet, the one that a point lies deepest in.
-            order = np.lexsort((-depth, point))
-            best = order[np.unique(point[order], return_index=True)[1]]
+            deepest = np.full(len(points), -np.inf)
+            np.maximum.at(deepest, point, depth)
+            alike = np.flatnonzero(depth >= deepest[point] - _ALIKE)
+            best = alike[np.unique(point[alike], return_index=True)[1]]
             best = best[depth[best] >= -_INSIDE]
             element[point[best]], local[point[best]] = tet[best], at[best]
     return element, local
@@ -258,12 +264,14 @@ def _nearest(mesh: Mesh, points: Array) -> tuple[Array, Array, Array, Array]:
     if "x" in mesh.symmetry:
         outer = ~(triangles[:, :, 0] == 0.0).all(axis=1)
     faces, owner, triangles = faces[outer], owner[outer], triangles[outer]
-    near = cKDTree(triangles.mean(axis=1)).query(points, min(_NEIGHBOURS, len(faces)))[1]
-    near = near.reshape(len(points), -1)
+    found = cKDTree(triangles.mean(axis=1)).query(points, min(_NEIGHBOURS, len(faces)))
+    middle, near = (one.reshape(len(points), -1) for one in found)
     at = closest_point(triangles[near].reshape(-1, 3, 3), np.repeat(points, near.shape[1], axis=0))
     at = at.reshape(*near.shape, 3)
     away = np.linalg.norm(at - points[:, None], axis=2)
-    rows, best = np.arange(len(points)), away.argmin(axis=1)
+    middle = np.where(away <= away.min(axis=1)[:, None] + _ALIKE, middle, np.inf)
+    alike = middle <= middle.min(axis=1)[:, None] + _ALIKE
+    rows, best = np.arange(len(points)), np.where(alike, near, len(faces)).argmin(axis=1)
     face, surface = near[rows, best], at[rows, best]
     element = owner[face]
     nodes = mesh.nodes[mesh.tets[element]]

@@ -84,3 +84,15 @@ def test_a_half_mesh_carries_both_sides():
     assert np.allclose(found, embed(whole, points).displacement(mirror_displacement(half, u, "x")), atol=1e-9)
     other = attrs.evolve(half, nodes=half.nodes * [-1, 1, 1], tets=half.tets[:, FLIPPED_TET])
     assert np.allclose(embed(other, points).displacement(u * [-1, 1, 1]), found, atol=1e-9)
+
+
+def test_rounding_does_not_choose_how_a_point_moves_where_elements_meet():
+    """On and beyond nodes, edges and faces, where each element continues a motion in its own way."""
+    mesh, random = bodies.box((3, 3, 3), (1.0, 1.0, 1.0)), np.random.default_rng(0)
+    ticks = np.arange(-2, 9) / 6
+    points = np.stack(np.meshgrid(ticks, ticks, ticks), axis=-1).reshape(-1, 3)
+    u = random.normal(size=mesh.nodes.shape)
+    carried = embed(mesh, points).displacement(u)
+    for _ in range(3):
+        nearby = points + 1e-14 * random.normal(size=points.shape)
+        assert np.allclose(embed(mesh, nearby).displacement(u), carried, atol=1e-9)

@@ -13,7 +13,7 @@ from mu_addon.fem.protocol import Protocol
 from mu_addon.meshing.settings import MeshSettings
 from mu_addon.report.motion_files import read_motion
 from mu_addon.studies.unit_ranking import UnitStudy
-from mu_addon.usecases.live_bending import requests, run
+from mu_addon.usecases.live_bending import known, requests, run
 from mu_addon.usecases.live_bending.run import LiveBending
 from tests.design.kinds import cross, custom
 
@@ -29,9 +29,9 @@ def coarse(monkeypatch):
     monkeypatch.setattr(run, "RUNGS", 2)
 
 
-def answered(bending, number, unit, kPa=8.0):
+def answered(bending, number, unit, kPa=8.0, shapes=None):
     """Pairs of kPa and degrees that answer a request, and its motion."""
-    requests.ask(bending.folder, number, UnitStudy(unit=unit, protocol=PROTOCOL), kPa)
+    requests.ask(bending.folder, number, UnitStudy(unit=unit, protocol=PROTOCOL), kPa, shapes=shapes)
     assert bending.step()
     found = json.loads((bending.folder / requests.BENT).read_text())
     assert found["number"] == number
@@ -41,7 +41,8 @@ def answered(bending, number, unit, kPa=8.0):
 
 def test_a_wall_from_the_design_before_bends_as_one_meshed_anew(tmp_path):
     warm, anew = LiveBending(tmp_path / "warm"), LiveBending(tmp_path / "anew")
-    first, motion = answered(warm, 1, UNIT)
+    shapes = tmp_path / "shapes"
+    first, motion = answered(warm, 1, UNIT, shapes=shapes)
     assert set(first) == {0.0, 4.0, 8.0}
     assert 0.0 == first[0.0] < first[4.0] < first[8.0]
     assert motion.state_kPa.tolist() == [0.0, 4.0, 8.0]
@@ -55,6 +56,23 @@ def test_a_wall_from_the_design_before_bends_as_one_meshed_anew(tmp_path):
     for kPa in (6.0, 12.0):
         assert second[kPa] == pytest.approx(wanted[kPa], rel=5e-3)
     assert not warm.step(), "nothing more was asked for"
+
+    # Its shape is found again, at its own size and stiffness and at others, and for a unit like it.
+    for scale, stiffer in ((1.0, 1.0), (1.5, 2.0)):
+        asked = UNIT.evolve(scale=scale, membrane_modulus_kPa=2500.0 * stiffer)
+        kept = known.nearest(asked, tmp_path / "none", shapes)
+        assert kept.same
+        assert kept.answer["states"] == [[stiffer * kPa, angle] for kPa, angle in first.items()]
+        for region in motion.surfaces:
+            skins = kept.motion.skin(region, False), motion.skin(region, False)
+            assert (skins[0].triangles == skins[1].triangles).all()
+            of = (
+                (m.mesh.nodes + m.model_a[-1])[s.node]
+                for m, s in zip((kept.motion, motion), skins, strict=True)
+            )
+            assert next(of) == pytest.approx(scale * next(of), abs=1e-3)
+    assert not known.nearest(thicker, shapes).same
+    assert known.nearest(UNIT.evolve(count=4), shapes) is None
 
 
 @pytest.mark.nightly("test_a_wall_from_the_design_before_bends_as_one_meshed_anew")

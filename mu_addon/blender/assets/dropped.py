@@ -16,7 +16,7 @@ from ...errors import InputError
 from ...reading import parse_json
 from ..preview import materials
 from ..shared import displays, restoring, viewports
-from ..shared.operators import linked, reports_errors
+from ..shared.operators import FreeOperator, linked, operator
 from ..shared.registration import handler, timer
 from ..unit import drawing, resins
 from ..unit import object as unit_object
@@ -25,33 +25,29 @@ RESIN, PRINTER = "mu_resin", "mu_printer"
 """On a material: parameters as JSON, by section and name. On an object: the name of a shipped printer."""
 
 
-class MU_OT_take_asset(bpy.types.Operator):
+@operator(
+    FreeOperator,
+    "Use Dropped Asset",
+    unit=StringProperty(name="Unit", description="UUID of the unit", options={"HIDDEN"}),
+    asset=StringProperty(name="Asset", description="Name of the material or object", options={"HIDDEN"}),
+)
+def take_asset(operator, unit, asset):
     """Give a unit the resin or printer that was dropped on it"""
-
-    bl_label = "Use Dropped Asset"
-    bl_options = {"REGISTER", "UNDO", "INTERNAL"}
-
-    unit: StringProperty(name="Unit", description="UUID of the unit", options={"HIDDEN"})
-    asset: StringProperty(name="Asset", description="Name of the material or object", options={"HIDDEN"})
-
-    @reports_errors
-    def execute(self, context):
-        root = unit_object.by_uuid(self.unit)
-        resin, box = bpy.data.materials.get(self.asset), bpy.data.objects.get(self.asset)
-        if root is None or linked(root):
-            raise InputError("there is no unit to take it", self.asset, "drop it on a unit of this file")
-        if resin is not None and resin.get(RESIN):
-            _take_resin(root, resin)
-            words = f"{root.name} is of {resin.name}: its wall's modulus, Poisson's ratio and law"
-        elif box is not None and box.get(PRINTER):
-            words = f"{root.name} is printed by {box.name}"
-            _take_printer(root, box)
-        else:
-            raise InputError(
-                f"{self.asset!r} is neither a resin nor a printer", "assets", "drop one of this extension"
-            )
-        self.report({"INFO"}, words)
-        return {"FINISHED"}
+    root = unit_object.by_uuid(unit)
+    resin, box = bpy.data.materials.get(asset), bpy.data.objects.get(asset)
+    if root is None or linked(root):
+        raise InputError("there is no unit to take it", asset, "drop it on a unit of this file")
+    if resin is not None and resin.get(RESIN):
+        _take_resin(root, resin)
+        words = f"{root.name} is of {resin.name}: its wall's modulus, Poisson's ratio and law"
+    elif box is not None and box.get(PRINTER):
+        words = f"{root.name} is printed by {box.name}"
+        _take_printer(root, box)
+    else:
+        raise InputError(
+            f"{asset!r} is neither a resin nor a printer", "assets", "drop one of this extension"
+        )
+    operator.report({"INFO"}, words)
 
 
 def _take_resin(root: Any, resin: Any) -> None:

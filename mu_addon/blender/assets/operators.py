@@ -2,11 +2,10 @@
 
 # Blender reads the annotations themselves: no `from __future__ import annotations` here.
 
-import bpy
 from bpy.props import EnumProperty
 
 from ..preview import nodes
-from ..shared.operators import FreeOperator, operator
+from ..shared.operators import FreeOperator, RootOperator, operator
 from . import library
 from . import sample as sample_scenes
 
@@ -26,29 +25,28 @@ def assets_remove():
     library.remove()
 
 
-class MU_OT_skin(bpy.types.Operator):
-    """Give the active curve or mesh a node group: tubes, a waveguide with wells, balls"""
+def _skinned(context):
+    obj = getattr(context, "object", None)
+    return obj if obj is not None and obj.type in ("MESH", "CURVE", "CURVES") else None
 
-    bl_label = "Skin with Nodes"
-    bl_options = {"REGISTER", "UNDO"}
 
-    group: EnumProperty(
+class _OnCurve(RootOperator):
+    find_root = staticmethod(_skinned)
+    no_root, linked_too = "Select a curve or a mesh", True
+
+
+@operator(
+    _OnCurve,
+    "Skin with Nodes",
+    group=EnumProperty(
         name="Group",
         description="Node group to add as a modifier",
         items=[(name, name, one.text) for name, one in nodes.GROUPS.items()],
-    )
-
-    @classmethod
-    def poll(cls, context):
-        obj = getattr(context, "object", None)
-        if obj is None or obj.type not in ("MESH", "CURVE", "CURVES"):
-            cls.poll_message_set("Select a curve or a mesh")
-            return False
-        return True
-
-    def execute(self, context):
-        nodes.skin(context.object, self.group)
-        return {"FINISHED"}
+    ),
+)
+def skin(root, group):
+    """Give the active curve or mesh a node group: tubes, a waveguide with wells, balls"""
+    nodes.skin(root, group)
 
 
 @operator(

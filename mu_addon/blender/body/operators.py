@@ -2,8 +2,6 @@
 
 # Blender reads the annotations themselves: no `from __future__ import annotations` here.
 
-import bpy
-
 from ...design.body import require_sound
 from ...design.printing.repair import repaired
 from ...errors import InputError
@@ -43,15 +41,12 @@ def report_flaws(operator, root, found, sound):
         operator.report({"WARNING"}, f"{sentence(flaw.what)}: {flaw.remedy}")
 
 
-class MU_OT_body_check(UnitOperator, bpy.types.Operator):
+@operator(UnitOperator, "Check Body")
+def body_check(operator, context, root):
     """Check the selected mesh for open edges, self-intersections, size and fit; mark the places"""
-
-    bl_label = "Check Body"
-
-    def act(self, context, root):
-        body = bodies.of_object(selected_mesh(context), root)
-        found = bodies.examined(body, to_unit(root.mu_unit).dimensions)
-        report_flaws(self, root, found, f"{body.name} can be an envelope: {len(body.triangles)} triangles")
+    body = bodies.of_object(selected_mesh(context), root)
+    found = bodies.examined(body, to_unit(root.mu_unit).dimensions)
+    report_flaws(operator, root, found, f"{body.name} can be an envelope: {len(body.triangles)} triangles")
 
 
 @operator(UnitOperator, "Repair Copy")

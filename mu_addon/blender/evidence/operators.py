@@ -118,4 +118,4 @@ def evidence_protocol(root, experiment):
     root.mu_unit.study.protocol = str(path)
 
 
-CLASSES = job_operators(evidence.DIAGNOSIS, "diagnose first")
+job_operators(evidence.DIAGNOSIS, "diagnose first")

@@ -81,4 +81,4 @@ def grasp_show(context, root, on):
         timeline.hide(root)
 
 
-CLASSES = job_operators(grasps.GRASP, "press Grasp first", base=GripperOperator)
+job_operators(grasps.GRASP, "press Grasp first", base=GripperOperator)

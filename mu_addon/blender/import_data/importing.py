@@ -12,7 +12,7 @@ from ...errors import InputError, MuError
 from ...files import make_folder
 from ..jobs.here import run_here
 from ..shared import viewports
-from ..shared.operators import open_file, operator
+from ..shared.operators import choose_file, open_file, operator
 from ..shared.panels import wrapped
 from ..shared.registration import property_of
 from ..simulate import study_folder as studies
@@ -53,46 +53,40 @@ FOLDER = "measured"
 ENDINGS = "*.csv;*.txt;*.tsv;*.dat;*.tra;*.xlsx;*.xls;*.xlsm;*.xlsb;*.ods"
 
 
-class MU_OT_import_files(UnitOperator, bpy.types.Operator):
+@operator(
+    UnitOperator,
+    "Import Files...",
+    invoke=choose_file,
+    directory=StringProperty(subtype="DIR_PATH", options={"HIDDEN", "SKIP_SAVE"}),
+    files=CollectionProperty(type=bpy.types.OperatorFileListElement, options={"HIDDEN", "SKIP_SAVE"}),
+    filter_glob=StringProperty(default=ENDINGS, options={"HIDDEN"}),
+)
+def import_files(operator, root, directory, files):
     """Read files exported by test machines and data loggers into the unit's measured data"""
-
-    bl_label = "Import Files..."
-
-    directory: StringProperty(subtype="DIR_PATH", options={"HIDDEN", "SKIP_SAVE"})
-    files: CollectionProperty(type=bpy.types.OperatorFileListElement, options={"HIDDEN", "SKIP_SAVE"})
-    filter_glob: StringProperty(default=ENDINGS, options={"HIDDEN"})
-
-    def invoke(self, context, event):
-        context.window_manager.fileselect_add(self)
-        return {"RUNNING_MODAL"}
-
-    def act(self, context, root):
-        chosen = [str(Path(self.directory) / one.name) for one in self.files if one.name]
-        if not chosen:
-            raise InputError("No file was chosen: choose one or more files of measured data")
-        root.mu_import.answers.clear()
-        root.mu_import.files = "\n".join(chosen)
-        return _import(self, root)
+    chosen = [str(Path(directory) / one.name) for one in files if one.name]
+    if not chosen:
+        raise InputError("No file was chosen: choose one or more files of measured data")
+    root.mu_import.answers.clear()
+    root.mu_import.files = "\n".join(chosen)
+    return _import(operator, root)
 
 
-class MU_OT_import_answers(UnitOperator, bpy.types.Operator):
+@operator(UnitOperator, "Import with These Answers")
+def import_answers(operator, root):
     """Import the files with these answers"""
-
-    bl_label = "Import with These Answers"
-
-    def act(self, context, root):
-        lacking = [one for one in root.mu_import.answers if not one.value.strip()]
-        if lacking:
-            raise InputError(f"Not answered: {lacking[0].words}")
-        for one in root.mu_import.answers:
-            one.answered = True
-        try:
-            return _import(self, root)
-        except MuError:
-            # Rejected answers can be corrected.
-            for one in root.mu_import.answers:
-                one.answered = False
-            raise
+    answers = root.mu_import.answers
+    lacking = [one for one in answers if not one.value.strip()]
+    if lacking:
+        raise InputError(f"Not answered: {lacking[0].words}")
+    for one in answers:
+        one.answered = True
+    try:
+        return _import(operator, root)
+    except MuError:
+        # Rejected answers can be corrected.
+        for one in answers:
+            one.answered = False
+        raise
 
 
 @operator(UnitOperator, "Do Not Import")

@@ -13,7 +13,7 @@ from ...errors import InputError
 from ...run.child import CANCELLED, DONE, WAITING
 from ...run.progress import spell
 from ..shared import viewports
-from ..shared.operators import reports_errors
+from ..shared.operators import FreeOperator, operator
 from ..shared.registration import at_end, at_start, handler, menu
 from . import start_child
 from .panel import shortened, whole
@@ -34,45 +34,39 @@ def _of(key: str) -> start_child.Job | None:
     return next((job for job in listed() if key in ("", job.key)), None)
 
 
-class MU_OT_job_cancel(bpy.types.Operator):
+def _which(context, properties) -> str:
+    job = _of(properties.key)
+    return f"{job.title}: {whole(job.child)[1]}.\n{job_cancel.__doc__}" if job else ""
+
+
+@operator(
+    FreeOperator,
+    "Cancel Job",
+    undo=False,
+    tip=_which,
+    key=StringProperty(name="Job", description="Key of the job", options={"HIDDEN"}),
+)
+def job_cancel(key):
     """Stop this job, or take it out of the queue; finished stages are kept"""
-
-    bl_label = "Cancel Job"
-    bl_options = {"REGISTER"}
-
-    key: StringProperty(name="Job", description="Key of the job", options={"HIDDEN"})
-
-    @classmethod
-    def description(cls, context, properties):
-        job = _of(properties.key)
-        return f"{job.title}: {whole(job.child)[1]}.\n{cls.__doc__}" if job else cls.__doc__
-
-    @reports_errors
-    def execute(self, context):
-        job = _of(self.key)
-        if job is None:
-            raise InputError("this job is not running", "jobs", "start one first")
-        job.child.cancel()
-        viewports.redraw()
-        return {"FINISHED"}
+    job = _of(key)
+    if job is None:
+        raise InputError("this job is not running", "jobs", "start one first")
+    job.child.cancel()
+    viewports.redraw()
 
 
-class MU_OT_job_dismiss(bpy.types.Operator):
+@operator(
+    FreeOperator,
+    "Dismiss",
+    undo=False,
+    tip=lambda *_: "\n".join([*map(_words, start_child.ended()), str(job_dismiss.__doc__)]),
+)
+def job_dismiss():
     """Dismiss the notices of ended jobs, here and in their panels; their results stay"""
-
-    bl_label = "Dismiss"
-    bl_options = {"REGISTER"}
-
-    @classmethod
-    def description(cls, context, properties):
-        return "\n".join([*map(_words, start_child.ended()), cls.__doc__])
-
-    def execute(self, context):
-        for job in start_child.ended():
-            start_child.forget(job.key)
-        viewports.redraw()
-        viewports.redraw_status()
-        return {"FINISHED"}
+    for job in start_child.ended():
+        start_child.forget(job.key)
+    viewports.redraw()
+    viewports.redraw_status()
 
 
 class MU_MT_jobs(bpy.types.Menu):

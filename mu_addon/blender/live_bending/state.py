@@ -1,7 +1,8 @@
 """A unit bent while it is designed: the process that finds its shapes, and the objects that show them.
 
 The process (`studies.live`) waits between changes. A timer sends a request once the parameters rest,
-and shows the answer in the unit's place. It ends while a job that takes the machine runs.
+and shows the answer in the unit's place. It ends while a job that takes the machine runs. Until its first
+answer a shape is shown that was found before, in any session: the unit's own, else, dim, that of one like it.
 """
 
 from __future__ import annotations
@@ -16,25 +17,32 @@ import attrs
 import bpy
 import numpy as np
 
+from ...design.assets import asset_root
 from ...errors import InputError, MuError
 from ...placement.sampling import polynomials
 from ...reading import file_bytes, parse_json
 from ...report.motion_files import Motion, read_motion
 from ...run.child import RUNNING, Child
 from ..jobs import start_child
+from ..obstacles import state as obstacles
 from ..results import bodies
 from ..shared import displays, viewports
+from ..shared.compat import user_folder
 from ..shared.displays import LIVE
 from ..shared.registration import RESTORED, at_end, connected, handler, timer
+from ..simulate import effects
 from ..simulate import job as simulation
 from ..simulate import study_folder as studies
 from ..unit import object as unit_object
+from ..unit.properties import to_unit
 from . import colours
 from .properties import COLOURED, PLAIN, PRESSED, SWITCHED
 
 RESTS_S = 0.35
 """Seconds without a change after which the unit is bent again."""
 TICK_S = 0.1
+SHAPES = "bent"
+"""Folder of shapes that were found before: of the user's, and of the assets."""
 
 
 @attrs.frozen(eq=False)
@@ -62,6 +70,12 @@ class Shape:
         if field not in self._ends:
             self._ends[field] = colours.ends_of(self.fields, field)
         return self._ends[field]
+
+    def serves(self, root: Any) -> bool:
+        """Return True if nothing finer is found for what is asked of a unit of this design."""
+        reached = root.mu_live.pressure_kPa <= self.pressure_kPa[-1]
+        coloured = root.mu_live.colour == PLAIN or bool(self.fields)
+        return bool(self.design and self.finished and reached and coloured)
 
     def share(self, kPa: float) -> Any:
         """Weights (s,) of the shapes at a pressure up to the largest one."""
@@ -165,9 +179,26 @@ def _changed(root: Any) -> None:
     if design != live.design:
         live.design, live.arrived, live.trouble = design, None, ""
         live.due_s = time.monotonic() + RESTS_S if design else None
+        if design:
+            _recall(root, live)
         _tick_soon()
     if shape is not None:
         place(root)
+
+
+def _recall(root: Any, live: Live) -> None:
+    """Show a shape that was found before: the unit's own or, where none is shown, that of one like it."""
+    from ...usecases.live_bending.known import nearest
+
+    unit = to_unit(root.mu_unit)
+    if root.mu_unit.envelope or effects.inputs(root) or obstacles.inputs(root) or unit.wall.has_memory:
+        return
+    found = nearest(unit, user_folder(SHAPES), asset_root() / SHAPES)
+    if found is None or not (found.same or live.shape is None):
+        return
+    live.arrived = _shape(root, found.motion, found.answer, live.design if found.same else "")
+    if live.arrived.serves(root):
+        live.due_s = None
 
 
 @connected(PRESSED)
@@ -178,7 +209,7 @@ def _pressed(root: Any) -> None:
         return
     pose(root, live)
     shape = live.current
-    if shape is not None and shape.finished and root.mu_live.pressure_kPa > shape.pressure_kPa[-1]:
+    if shape is not None and shape.finished and not shape.serves(root):
         live.due_s = time.monotonic() + RESTS_S
         _tick_soon()
 
@@ -264,7 +295,7 @@ def _ask(root: Any, live: Live) -> None:
         write_study(Live(), live.folder)
     live.number += 1
     kPa, fields = root.mu_live.pressure_kPa, root.mu_live.colour != PLAIN
-    requests.ask(live.folder, live.number, study, kPa, fields)
+    requests.ask(live.folder, live.number, study, kPa, fields, user_folder(SHAPES))
     if live.child is None:
         command = ["resume", str(live.folder), "--json"]
         live.child = start_child.start(command, live.folder, ends_with_parent=True)
@@ -288,6 +319,9 @@ def _answered(root: Any, live: Live) -> bool:
     if answer["trouble"]:
         live.trouble = answer["trouble"]
         return True
+    kept = live.current
+    if kept is not None and answer["error"] > kept.error and answer["states"][-1][0] <= kept.pressure_kPa[-1]:
+        return False  # coarser than the one from before, which shows as much
     live.arrived = _shape(root, read_motion(live.folder / answer["folder"]), answer, live.design)
     return True
 

@@ -37,19 +37,20 @@ def words(root: Any) -> str:
         return ""
     if root.mu_unit.trouble:
         return "A design rule is broken"
-    if start_child.is_busy():
-        return "After the running job"
     if live.trouble:
         return live.trouble[:1].upper() + live.trouble[1:]
     shape = live.current
     if shape is None:
-        return "Bending..." if live.shape is None else "Bending... (dim: the shape before)"
+        doing = "After the running job" if start_child.is_busy() else "Bending..."
+        dim = "" if live.shape is None else "the shape before" if live.shape.design else "a unit like it"
+        return f"{doing} (dim: {dim})" if dim else doing
     kPa = min(root.mu_live.pressure_kPa, float(shape.pressure_kPa[-1]))
     angle = state.angle_at(shape, kPa)
     if shape.finished:
         return f"{angle:.1f}° at {kPa:.4g} kPa, as simulated"
     error = max(shape.error * abs(angle), LEAST_DEG)
-    return f"{angle:.1f} ± {error:.1f}° at {kPa:.4g} kPa, refining"
+    then = "finer after the job" if start_child.is_busy() else "refining"
+    return f"{angle:.1f} ± {error:.1f}° at {kPa:.4g} kPa, {then}"
 
 
 @overlay

@@ -16,7 +16,7 @@ from ...usecases.graph.definitions import definitions
 from ..jobs import start_child
 from ..jobs.operators import job_operators
 from ..shared.blender_property import listed
-from ..shared.operators import FreeOperator, open_file, operator, reports_errors
+from ..shared.operators import FreeOperator, choose_file, open_file, operator
 from ..shared.wording import sentence
 from ..unit.base_classes import UnitOperator
 from . import conversion, following, state
@@ -99,66 +99,58 @@ def tree_new(context, template):
     _open(context, conversion.from_tree(templates.template(template)))
 
 
-class MU_OT_tree_load(bpy.types.Operator):
+_FILTER = StringProperty(default="*.toml", options={"HIDDEN"})
+
+
+@operator(
+    FreeOperator,
+    "Open Tree File",
+    invoke=choose_file,
+    filepath=StringProperty(name="File", description="TOML file of a node tree", subtype="FILE_PATH"),
+    filter_glob=_FILTER,
+)
+def tree_load(context, filepath):
     """Open a node tree's file, as `headless/run.py graph` reads it"""
-
-    bl_label = "Open Tree File"
-    bl_options = {"REGISTER", "UNDO"}
-
-    filepath: StringProperty(name="File", description="TOML file of a node tree", subtype="FILE_PATH")
-    filter_glob: StringProperty(default="*.toml", options={"HIDDEN"})
-
-    def invoke(self, context, event):
-        context.window_manager.fileselect_add(self)
-        return {"RUNNING_MODAL"}
-
-    @reports_errors
-    def execute(self, context):
-        path = Path(bpy.path.abspath(self.filepath))
-        _open(context, conversion.from_tree(with_absolute_paths(read_tree(path), definitions(), path.parent)))
-        return {"FINISHED"}
+    path = Path(bpy.path.abspath(filepath))
+    _open(context, conversion.from_tree(with_absolute_paths(read_tree(path), definitions(), path.parent)))
 
 
-class MU_OT_tree_save(_TreeOperator, bpy.types.Operator):
+def _choose_target(operator, context, event):
+    operator.filepath = operator.filepath or f"{root_tree(context).name}.toml"
+    return choose_file(operator, context, event)
+
+
+@operator(
+    _TreeOperator,
+    "Save Tree File",
+    undo=False,
+    invoke=_choose_target,
+    filepath=StringProperty(name="File", description="TOML file to write", subtype="FILE_PATH"),
+    filter_glob=_FILTER,
+)
+def tree_save(operator, tree, filepath):
     """Write the tree to a file for `headless/run.py graph`; groups are written as their nodes"""
-
-    bl_label = "Save Tree File"
-    bl_options = {"REGISTER"}
-
-    filepath: StringProperty(name="File", description="TOML file to write", subtype="FILE_PATH")
-    filter_glob: StringProperty(default="*.toml", options={"HIDDEN"})
-
-    def invoke(self, context, event):
-        self.filepath = self.filepath or f"{root_tree(context).name}.toml"
-        context.window_manager.fileselect_add(self)
-        return {"RUNNING_MODAL"}
-
-    def act(self, context, tree):
-        core = conversion.to_tree(tree)
-        if not core.nodes:
-            raise InputError("the tree has no nodes", core.name, "add some, or start from a template")
-        path = Path(bpy.path.abspath(self.filepath)).with_suffix(".toml")
-        write_text(path, tree_text(core))
-        self.report({"INFO"}, f"Wrote {path}")
+    core = conversion.to_tree(tree)
+    if not core.nodes:
+        raise InputError("the tree has no nodes", core.name, "add some, or start from a template")
+    path = Path(bpy.path.abspath(filepath)).with_suffix(".toml")
+    write_text(path, tree_text(core))
+    operator.report({"INFO"}, f"Wrote {path}")
 
 
-class MU_OT_tree_of_unit(UnitOperator, bpy.types.Operator):
+@operator(
+    UnitOperator,
+    "Tree of the Active Unit",
+    linked_too=True,
+    steps=BoolProperty(
+        name="Steps", description="Lay out the steps of its design, and have the unit follow them"
+    ),
+)
+def tree_of_unit(context, root, steps):
     """Add a tree with the active unit: its sidebar and the tree's node show the same fields"""
-
-    bl_label = "Tree of the Active Unit"
-
-    steps: BoolProperty(
-        name="Steps",
-        description="Lay out the steps of its design, and have the unit follow them",
-        default=False,
-    )
-
-    linked_too = True
-
-    def act(self, context, root):
-        tree = state.tree_of_unit(root, self.steps)
-        state.refresh(tree)
-        show(context, tree)
+    tree = state.tree_of_unit(root, steps)
+    state.refresh(tree)
+    show(context, tree)
 
 
 @operator(UnitOperator, "Show the Tree", undo=False)
@@ -214,4 +206,4 @@ def node_open(context, tree, what):
     open_file(context, path)
 
 
-CLASSES = job_operators(state.RUN, "evaluate the tree first", base=_TreeOperator)
+job_operators(state.RUN, "evaluate the tree first", base=_TreeOperator)

@@ -23,25 +23,25 @@ from . import state as obstacles
 NO_OBSTACLE = "No obstacle yet: select a closed mesh and use it as one"
 
 
-class ObstacleOperator(UnitOperator):
-    """An operator on the obstacles of the active unit; greyed out, with the reason, without any."""
+_NAME = StringProperty(
+    name="Obstacle", description="Name of its object. Empty: all of this unit", options={"SKIP_SAVE"}
+)
 
-    name: StringProperty(
-        name="Obstacle", description="Name of its object. Empty: all of this unit", options={"SKIP_SAVE"}
-    )
+
+class _OfObstacles(UnitOperator):
+    """An operator on the obstacles of the active unit; greyed out, with the reason, without any."""
 
     trouble = unless(obstacles.of_unit, NO_OBSTACLE)
 
-    def chosen(self, root):
-        """Objects to act on; raises InputError for an unknown name."""
-        found = obstacles.of_unit(root)
-        chosen = [o for o in found if o.name == self.name] if self.name else found
-        if not chosen:
-            names = ", ".join(o.name for o in found)
-            raise InputError(
-                f"{self.name!r} is not an obstacle of this unit", root.name, f"choose one of {names}"
-            )
-        return chosen
+
+def _chosen(root, name):
+    """Objects to act on; raises InputError for an unknown name."""
+    found = obstacles.of_unit(root)
+    chosen = [o for o in found if name in ("", o.name)]
+    if not chosen:
+        names = ", ".join(o.name for o in found)
+        raise InputError(f"{name!r} is not an obstacle of this unit", root.name, f"choose one of {names}")
+    return chosen
 
 
 @operator(ValidUnitOperator, "Use as Obstacle", friction=blender_property(FRICTION, precision=2))
@@ -88,33 +88,23 @@ def obstacle_box(context, root, size, gap, friction):
     obj.mu_obstacle.unit, obj.mu_obstacle.friction = root.mu_unit.uuid, friction
 
 
-class MU_OT_obstacle_check(ObstacleOperator, bpy.types.Operator):
+@operator(_OfObstacles, "Check Obstacles", name=_NAME)
+def obstacle_check(operator, root, name):
     """Check obstacles for open edges, self-intersections, size and overlap; mark the places"""
-
-    bl_label = "Check Obstacles"
-
-    def act(self, context, root):
-        core, chosen = to_unit(root.mu_unit), self.chosen(root)
-        found = [flaw for obj in chosen for flaw in obstacles.examined(root, obj, core)]
-        report_flaws(
-            self, root, found, f"{counted(len(chosen), 'obstacle', 'obstacles')}, valid and clear of the unit"
-        )
+    core, chosen = to_unit(root.mu_unit), _chosen(root, name)
+    found = [flaw for obj in chosen for flaw in obstacles.examined(root, obj, core)]
+    sound = f"{counted(len(chosen), 'obstacle', 'obstacles')}, valid and clear of the unit"
+    report_flaws(operator, root, found, sound)
 
 
-class MU_OT_obstacle_remove(ObstacleOperator, bpy.types.Operator):
+@operator(_OfObstacles, "Remove Obstacle", name=_NAME)
+def obstacle_remove(root, name):
     """Remove an object from the obstacles; the object stays"""
-
-    bl_label = "Remove Obstacle"
-
-    def act(self, context, root):
-        for obj in self.chosen(root):
-            obj.property_unset("mu_obstacle")
+    for obj in _chosen(root, name):
+        obj.property_unset("mu_obstacle")
 
 
-class MU_OT_obstacle_select(ObstacleOperator, bpy.types.Operator):
+@operator(_OfObstacles, "Select Obstacle", name=_NAME)
+def obstacle_select(context, root, name):
     """Select an obstacle, to move it"""
-
-    bl_label = "Select Obstacle"
-
-    def act(self, context, root):
-        viewports.select(context, self.chosen(root))
+    viewports.select(context, _chosen(root, name))

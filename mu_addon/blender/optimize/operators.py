@@ -93,4 +93,4 @@ def optimize_add(context, root, number):
     landing.land(context, added)
 
 
-CLASSES = job_operators(optimization.OPTIMIZATION, "run the optimisation first")
+job_operators(optimization.OPTIMIZATION, "run the optimisation first")

@@ -14,6 +14,7 @@ from bpy.props import StringProperty
 from ...design.anchors import window
 from ..shared import restoring, updates, viewports
 from ..shared.displays import PART
+from ..shared.operators import operator
 from ..shared.registration import RESTORED, handler, timer
 from ..unit import object as unit_object
 from ..unit.base_classes import UnitOperator
@@ -22,32 +23,32 @@ from . import hover
 from .candidates import CANDIDATE
 
 
-class MU_OT_path(UnitOperator, bpy.types.Operator):
-    """Lay the waveguide along this path"""
+def _point_out(context, properties) -> str:
+    """Text of the tooltip, which also shows the path in its true place."""
+    root = unit_object.active_root(context)
+    if root is not None and root.mu_unit.candidates:
+        hover.point_out(root.mu_unit.path if properties.name == "none" else properties.name)
+    return "" if properties.name != "none" else "Remove the waveguide along this path"
 
-    bl_label = "Choose Sensor Path"
 
-    name: StringProperty(
+@operator(
+    UnitOperator,
+    "Choose Sensor Path",
+    tip=_point_out,
+    name=StringProperty(
         name="Path",
         description="Name of a path, alpha1 ..; `none` removes the waveguide, "
         "nothing takes the candidate that is selected in the viewport",
-    )
-
-    @classmethod
-    def description(cls, context, properties):
-        """Text of the tooltip, which also shows the path in its true place."""
-        root = unit_object.active_root(context)
-        if root is not None and root.mu_unit.candidates:
-            hover.point_out(root.mu_unit.path if properties.name == "none" else properties.name)
-        return cls.__doc__ if properties.name != "none" else "Remove the waveguide along this path"
-
-    def act(self, context, root):
-        name = self.name or selected_candidate(context)
-        if name and name != "none":
-            name = window(to_unit(root.mu_unit), name).name
-        with updates.paused():
-            root.mu_unit.path = "" if name == "none" else name
-        unit_object.rebuild(root)
+    ),
+)
+def path(context, root, name):
+    """Lay the waveguide along this path"""
+    name = name or selected_candidate(context)
+    if name and name != "none":
+        name = window(to_unit(root.mu_unit), name).name
+    with updates.paused():
+        root.mu_unit.path = "" if name == "none" else name
+    unit_object.rebuild(root)
 
 
 def selected_candidate(context) -> str:

@@ -2,7 +2,6 @@
 
 # Blender reads the annotations themselves: no `from __future__ import annotations` here.
 
-import bpy
 from bpy.props import BoolProperty, FloatVectorProperty, IntProperty
 
 from ...design.settings import UP
@@ -31,33 +30,24 @@ def print_check_file(root):
     printing.FILE_CHECK.start(root)
 
 
-class MU_OT_print_export(ValidUnitOperator, bpy.types.Operator):
+def _ask_if_wrong(operator, context, event):
+    wrong = printing.errors(unit_object.active_root(context))
+    if not wrong:
+        return operator.execute(context)
+    return context.window_manager.invoke_confirm(
+        operator,
+        event,
+        title="Export a part that is not printable?",
+        message=f"The check found errors: {wrong}",
+        confirm_text="Export",
+        icon="WARNING",
+    )
+
+
+@operator(ValidUnitOperator, "Export", undo=False, trouble=printing.EXPORT.trouble, invoke=_ask_if_wrong)
+def print_export(root):
     """Write the chosen files of the unit with its path; asks first if the check found errors"""
-
-    bl_label = "Export"
-    bl_options = {"REGISTER"}
-
-    @classmethod
-    def trouble(cls, root):
-        return super().trouble(root) or printing.EXPORT.trouble(root)
-
-    def act(self, context, root):
-        printing.EXPORT.start(root)
-
-    def invoke(self, context, event):
-        found = printing.CHECK.found(unit_object.active_root(context))
-        errors = [] if found is None or found.stale else printing.errors(found)
-        if not errors:
-            return self.execute(context)
-        names = ", ".join(error["check"] for error in errors)
-        return context.window_manager.invoke_confirm(
-            self,
-            event,
-            title="Export a part that is not printable?",
-            message=f"The check found errors: {names}",
-            confirm_text="Export",
-            icon="WARNING",
-        )
+    printing.EXPORT.start(root)
 
 
 @operator(ValidUnitOperator, "Export Specimens", undo=False, trouble=printing.SPECIMENS.trouble)
@@ -177,7 +167,7 @@ def print_layer_clear(root):
     layer.clear(root)
 
 
-CLASSES = job_operators(
+job_operators(
     printing.PRINTING,
     "check or export first",
     kept="files that are complete are kept",

@@ -56,9 +56,8 @@ class MU_OT_export_stl(ValidUnitOperator, bpy.types.Operator, ExportHelper):
         root = unit_object.active_root(context)
         path = root.mu_unit.path
         self.filepath = f"{root.mu_unit.title}{'-' + path if path else ''}.stl"
-        found = printing.checked(root)
-        if found is not None and not found.stale and found.errors:
-            self.report({"WARNING"}, f"The check found: {found.errors[0]['check']}. Do not print this")
+        if wrong := printing.errors(root):
+            self.report({"WARNING"}, f"The check found: {wrong}. Do not print this")
         return ExportHelper.invoke(self, context, event)
 
     def act(self, context, root):

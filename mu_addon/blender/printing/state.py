@@ -241,9 +241,11 @@ def _places(check: dict[str, Any], folder: Path) -> dict[str, Any]:
     return check
 
 
-def errors(found: study_job.Found) -> list[dict[str, Any]]:
-    """Findings of a check that forbid printing."""
-    return [f for f in found.content["findings"] if f["severity"] == "error"]
+def errors(root: Any) -> str:
+    """Names of the findings that forbid printing, of a check of the unit as it is; else ""."""
+    found = CHECK.found(root)
+    findings = [] if found is None or found.stale else found.content["findings"]
+    return ", ".join(f["check"] for f in findings if f["severity"] == "error")
 
 
 def _job(name: str, given: Any, where: str = "", **more: Any) -> study_job.StudyJob:

@@ -2,7 +2,6 @@
 
 # Blender reads the annotations themselves: no `from __future__ import annotations` here.
 
-import bpy
 import numpy as np
 from bpy.props import BoolProperty, EnumProperty
 from mathutils import Quaternion, Vector
@@ -10,6 +9,7 @@ from mathutils import Quaternion, Vector
 from ...errors import InputError
 from ...report.motion_files import CONTACT_PRESSURE, MODEL_A, REGIONS, SENSITIVITY
 from ..shared import updates, viewports
+from ..shared.operators import operator
 from ..simulate import study_folder as studies
 from ..unit import object as unit_object
 from . import field_colours, places, run_motions
@@ -20,52 +20,49 @@ OPEN = Quaternion((0.5, 0.5, 0.5, 0.5))
 """View from +x, for a body that is cut open."""
 
 
-class MU_OT_field_show(MotionOperator, bpy.types.Operator):
-    """Paint this field on the unit, in view, at the frame at which it is largest"""
+def _field_in_words(context, properties) -> str:
+    root = unit_object.active_root(context)
+    reason = lacking(root, properties.field) if root is not None else ""
+    text = next(f.text for f in field_colours.FIELDS if f.name == properties.field)
+    return f"{text}. Not here: {reason}" if reason else f"{field_show.__doc__}: {text}"
 
-    bl_label = "Show on the Unit"
 
-    field: EnumProperty(
+@operator(
+    MotionOperator,
+    "Show on the Unit",
+    tip=_field_in_words,
+    field=EnumProperty(
         name="Field",
         description="Physical quantity to show",
         items=[(f.name, f.label, f.text) for f in field_colours.FIELDS],
-    )
-    frame: BoolProperty(name="Frame in View", description="Bring the unit into view", default=True)
-    jump: BoolProperty(
+    ),
+    frame=BoolProperty(name="Frame in View", description="Bring the unit into view", default=True),
+    jump=BoolProperty(
         name="Jump to the Largest", description="Go to the frame of the field's largest value", default=True
-    )
-
-    @classmethod
-    def description(cls, context, properties):
-        root = unit_object.active_root(context)
-        reason = lacking(root, properties.field) if root is not None else ""
-        text = next(f.text for f in field_colours.FIELDS if f.name == properties.field)
-        return f"{text}. Not here: {reason}" if reason else f"{cls.__doc__}: {text}"
-
-    def act(self, context, root):
-        motion = motion_parts.motion_of(root)
-        name = whose(root, motion, self.field)
-        if self.field == motion_parts.DIFFERENCE:
-            run_motions.apart(
-                root, motion, name, next(iter(REGIONS)), bool(root.mu_motion.cut and motion.halved)
-            )
-        for pair in motion_parts.shown(root):
-            if pair != (name, motion_parts.MESH):
-                motion_parts.hide(root, *pair)
-        settings = root.mu_motion
-        with updates.paused():
-            settings.field, settings.on_unit = self.field, True
-        # They would cover the colours, at the position of the unit at rest.
-        unit_object.hide_candidates(root)
-        motion_parts.show(root, name, motion_parts.MESH)
-        if self.field == motion_parts.DIFFERENCE and run_motions.difference_words(root):
-            found = motion_parts.parts(root)
-            if not any(self.field in part.data.attributes for part in found):
-                raise InputError(run_motions.difference_words(root))
-            self.report({"INFO"}, run_motions.difference_words(root))
-        motion_parts.to_largest(root, motion, context.scene, self.jump)
-        if self.frame:
-            frame_in_view(context, root)
+    ),
+)
+def field_show(operator, context, root, field, frame, jump):
+    """Paint this field on the unit, in view, at the frame at which it is largest"""
+    motion = motion_parts.motion_of(root)
+    name = whose(root, motion, field)
+    if field == motion_parts.DIFFERENCE:
+        run_motions.apart(root, motion, name, next(iter(REGIONS)), bool(root.mu_motion.cut and motion.halved))
+    for pair in motion_parts.shown(root):
+        if pair != (name, motion_parts.MESH):
+            motion_parts.hide(root, *pair)
+    settings = root.mu_motion
+    with updates.paused():
+        settings.field, settings.on_unit = field, True
+    # They would cover the colours, at the position of the unit at rest.
+    unit_object.hide_candidates(root)
+    motion_parts.show(root, name, motion_parts.MESH)
+    if field == motion_parts.DIFFERENCE and (words := run_motions.difference_words(root)):
+        if not any(field in part.data.attributes for part in motion_parts.parts(root)):
+            raise InputError(words)
+        operator.report({"INFO"}, words)
+    motion_parts.to_largest(root, motion, context.scene, jump)
+    if frame:
+        frame_in_view(context, root)
 
 
 def lacking(root, field: str) -> str:

@@ -16,7 +16,7 @@ from ...errors import InputError
 from ...reading import parse_toml, text_in
 from ..preview import skeletons
 from ..shared import landing, viewports
-from ..shared.operators import reports_errors
+from ..shared.operators import FreeOperator, operator
 from ..unit import object as unit_object
 from ..unit.base_classes import UnitOperator
 
@@ -25,97 +25,81 @@ SURFACES = ".stl;.obj;.ply"
 _LONGEST = 10_000_000
 
 
-class _Dropped:
-    """An operator on a dropped file."""
-
-    bl_options = {"REGISTER", "UNDO"}
-
-    filepath: StringProperty(
-        name="File", description="The file that was dropped", subtype="FILE_PATH", options={"SKIP_SAVE"}
-    )
-
-    def path(self) -> Path:
-        """The file; raises InputError where none is named."""
-        if not self.filepath:
-            raise InputError("no file is named", "filepath", "drop one into the view")
-        return Path(bpy.path.abspath(self.filepath))
+_FILE = StringProperty(
+    name="File", description="The file that was dropped", subtype="FILE_PATH", options={"SKIP_SAVE"}
+)
 
 
-class MU_OT_drop_toml(_Dropped, bpy.types.Operator):
-    """Add the unit that a TOML file describes where it is dropped, or open the node tree that it holds"""
+def _path(filepath: str) -> Path:
+    """The dropped file; raises InputError where none is named."""
+    if not filepath:
+        raise InputError("no file is named", "filepath", "drop one into the view")
+    return Path(bpy.path.abspath(filepath))
 
-    bl_label = "Unit or Node Tree"
 
-    place: FloatVectorProperty(
+def _at_the_mouse(operator, context, event):
+    # At the depth of the 3D cursor.
+    region, space = context.region, getattr(context, "region_data", None)
+    if space is not None and region is not None:
+        from bpy_extras.view3d_utils import region_2d_to_location_3d
+
+        mouse = event.mouse_region_x, event.mouse_region_y
+        operator.place = region_2d_to_location_3d(region, space, mouse, context.scene.cursor.location)
+    return operator.execute(context)
+
+
+@operator(
+    FreeOperator,
+    "Unit or Node Tree",
+    invoke=_at_the_mouse,
+    filepath=_FILE,
+    place=FloatVectorProperty(
         name="Place", description="Where it was dropped", options={"HIDDEN", "SKIP_SAVE"}
-    )
+    ),
+)
+def drop_toml(operator, context, filepath, place):
+    """Add the unit that a TOML file describes where it is dropped, or open the node tree that it holds"""
+    path = _path(filepath)
+    document = parse_toml(text_in(path, "file", "drop a TOML file", _LONGEST), str(path))
+    if "nodes" in document:
+        bpy.ops.mu.tree_load(filepath=str(path))
+        return
+    root = unit_object.create(context, read_unit(path))
+    if operator.properties.is_property_set("place"):
+        root.location = place
+    landing.land(context, root)
+    viewports.redraw()
 
-    def invoke(self, context, event):
-        # Where the mouse is, at the depth of the 3D cursor.
-        region, space = context.region, getattr(context, "region_data", None)
-        if space is not None and region is not None:
-            from bpy_extras.view3d_utils import region_2d_to_location_3d
 
-            mouse = event.mouse_region_x, event.mouse_region_y
-            self.place = region_2d_to_location_3d(region, space, mouse, context.scene.cursor.location)
-        return self.execute(context)
-
-    @reports_errors
-    def execute(self, context):
-        path = self.path()
-        document = parse_toml(text_in(path, "file", "drop a TOML file", _LONGEST), str(path))
-        if "nodes" in document:
-            bpy.ops.mu.tree_load(filepath=str(path))
-            return {"FINISHED"}
-        unit = read_unit(path)
-        root = unit_object.create(context, unit)
-        if self.properties.is_property_set("place"):
-            root.location = self.place
-        landing.land(context, root)
-        viewports.redraw()
+def _use_surface(operator, context, root, filepath, use):
+    """Put a closed surface, in mm in the active unit's frame, into the scene and then use it."""
+    path = _path(filepath)
+    body = read_body(path)
+    mesh = bpy.data.meshes.new(path.stem)
+    skeletons.write(mesh, skeletons.Skeleton(body.vertices, faces=(body.triangles,), smooth=False))
+    obj = bpy.data.objects.new(path.stem, mesh)
+    context.collection.objects.link(obj)
+    obj.matrix_world = root.matrix_world
+    context.view_layer.update()
+    viewports.select(context, [obj, root], root)
+    try:
+        return use()
+    except RuntimeError as error:
+        # The surface stays in the scene, selected, to be repaired.
+        operator.report({"ERROR"}, str(error).removeprefix("Error: ").strip())
         return {"FINISHED"}
 
 
-class _Surface(_Dropped, UnitOperator):
-    """A closed surface, in mm in the active unit's frame, put into the scene and then used."""
-
-    def act(self, context, root):
-        path = self.path()
-        body = read_body(path)
-        mesh = bpy.data.meshes.new(path.stem)
-        skeletons.write(mesh, skeletons.Skeleton(body.vertices, faces=(body.triangles,), smooth=False))
-        obj = bpy.data.objects.new(path.stem, mesh)
-        context.collection.objects.link(obj)
-        obj.matrix_world = root.matrix_world
-        context.view_layer.update()
-        viewports.select(context, [obj, root], root)
-        try:
-            done = self.use()
-        except RuntimeError as error:
-            # The surface stays in the scene, selected, to be repaired.
-            self.report({"ERROR"}, str(error).removeprefix("Error: ").strip())
-            return {"FINISHED"}
-        return done
-
-
-class MU_OT_drop_envelope(_Surface, bpy.types.Operator):
+@operator(UnitOperator, "Envelope of the Unit", filepath=_FILE)
+def drop_envelope(operator, context, root, filepath):
     """Add a closed surface from a file, in mm in the unit's frame, and have the lattice fill it"""
-
-    bl_label = "Envelope of the Unit"
-
-    def use(self):
-        """Make the surface the envelope, like the button."""
-        return bpy.ops.mu.body()
+    return _use_surface(operator, context, root, filepath, bpy.ops.mu.body)
 
 
-class MU_OT_drop_obstacle(_Surface, bpy.types.Operator):
+@operator(UnitOperator, "Obstacle of the Unit", filepath=_FILE)
+def drop_obstacle(operator, context, root, filepath):
     """Add a closed surface from a file, in mm in the unit's frame, as an obstacle of the unit"""
-
-    bl_label = "Obstacle of the Unit"
-
-    def use(self):
-        """Make the surface an obstacle, like the button."""
-        return bpy.ops.mu.obstacle()
+    return _use_surface(operator, context, root, filepath, bpy.ops.mu.obstacle)
 
 
 class MU_FH_toml(bpy.types.FileHandler):

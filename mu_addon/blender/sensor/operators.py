@@ -13,7 +13,7 @@ from ...sensing.session import SWEEP
 from ..jobs.operators import FILES, RUN_FILES, job_operators
 from ..results.operators import MotionOperator
 from ..shared import viewports
-from ..shared.operators import FreeOperator, operator
+from ..shared.operators import FreeOperator, ask_properties, operator
 from ..simulate import study_folder as studies
 from ..unit.base_classes import UnitOperator
 from . import state as sensor
@@ -89,21 +89,17 @@ def sensor_pause(root):
     session.child.send("resume" if session.state == "paused" else "pause")
 
 
-class MU_OT_sensor_mark(SessionOperator, bpy.types.Operator):
+@operator(
+    SessionOperator,
+    "Mark",
+    undo=False,
+    invoke=ask_properties,
+    words=StringProperty(name="Words", description="What happens now", default="here"),
+)
+def sensor_mark(root, words):
     """Write a mark with a text into the recording, at this moment"""
-
-    bl_label = "Mark"
-    bl_options = {"REGISTER"}
-
-    words: StringProperty(name="Words", description="What happens now", default="here")
-
-    def invoke(self, context, event):
-        return context.window_manager.invoke_props_dialog(self)
-
-    def act(self, context, root):
-        # One line: a second would be another command.
-        words = " ".join(self.words.split())
-        sensor.of(root).child.send(f"mark {words}")
+    # One line: a second would be another command.
+    sensor.of(root).child.send(f"mark {' '.join(words.split())}")
 
 
 @operator(UnitOperator, "Freeze", undo=False)
@@ -232,7 +228,7 @@ def _path_of(root, what):
     return sensor.latest_calibration(root) / FILES[what]
 
 
-CLASSES = job_operators(
+job_operators(
     sensor.CALIBRATION,
     "connect, or calibrate",
     kept="the previous calibration stays in use",

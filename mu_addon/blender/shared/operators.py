@@ -142,21 +142,26 @@ def operator(
     label: str,
     *,
     undo: bool = True,
+    linked_too: bool = False,
     trouble: Callable[[Any], str] | None = None,
+    invoke: Callable[[Any, Any, Any], set[str]] | None = None,
+    tip: Callable[[Any, Any], str] | None = None,
     **properties: Any,
 ) -> Callable[[Any], Any]:
     """A function as the operator of its name, its docstring in the tooltip; the function stays as it is.
 
-    base: a `RootOperator` or `FreeOperator`; trouble: of a root, further reason why it cannot run;
-    properties: of the operator, by name. The function's parameters name what it is given: `context`, `root`
-    (or `base.root_name`), properties, or the `operator` itself. It returns what `RootOperator.act` does.
+    base: a `RootOperator` or `FreeOperator`; linked_too: of it; trouble: of a root, further reason why it
+    cannot run; invoke: of the operator, what a press does first, such as `choose_file`; tip: of context and
+    properties, what the tooltip says instead, "" for the docstring; properties: of the operator, by name. The
+    function's parameters name what it is given: `context`, `root` (or `base.root_name`), properties, or the
+    `operator` itself. It returns what `RootOperator.act` does.
     """
 
     def made(function: Any) -> Any:
         names = list(inspect.signature(function).parameters)
 
         def act(self, context, root):
-            known = {"operator": self, "context": context, base.root_name: root}
+            known = {"operator": self, "context": context, "root": root, base.root_name: root}
             return function(**{name: known[name] if name in known else getattr(self, name) for name in names})
 
         members = {
@@ -167,6 +172,14 @@ def operator(
             "bl_options": {"REGISTER", "UNDO"} if undo else {"REGISTER"},
             "act": act,
         }
+        if linked_too:
+            members["linked_too"] = True
+        if invoke is not None:
+            members["invoke"] = invoke
+        if tip is not None:
+            members["description"] = classmethod(
+                lambda cls, context, properties: tip(context, properties) or cls.__doc__
+            )
         if trouble is not None:
             members["trouble"] = lambda root: base.trouble(root) or trouble(root)
         registration.made(type(f"MU_OT_{function.__name__}", (base, bpy.types.Operator), members))
@@ -184,6 +197,17 @@ class FreeOperator:
     @reports_errors
     def execute(self, context):
         return self.act(context, None) or {"FINISHED"}
+
+
+def choose_file(operator: Any, context: Any, event: Any) -> set[str]:
+    """Ask for the operator's file or files first."""
+    context.window_manager.fileselect_add(operator)
+    return {"RUNNING_MODAL"}
+
+
+def ask_properties(operator: Any, context: Any, event: Any) -> set[str]:
+    """Ask for the operator's properties first."""
+    return set(context.window_manager.invoke_props_dialog(operator))
 
 
 def open_file(context, path: Path) -> None:

@@ -48,4 +48,4 @@ def simulate(root, quick):
     kind.start(root, folder, lambda folder: write_study(job, folder), options)
 
 
-CLASSES = job_operators(SIMULATION, "simulate first", path_of=_file_of)
+job_operators(SIMULATION, "simulate first", path_of=_file_of)

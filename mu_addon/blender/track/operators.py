@@ -10,7 +10,7 @@ from bpy.props import StringProperty
 from ...errors import InputError
 from ...studies.track import Track
 from ..jobs.here import run_here
-from ..shared.operators import reports_errors
+from ..shared.operators import RootOperator, operator, reports_errors, unless
 from ..unit import object as unit_object
 from . import properties as bench
 from . import state as tracking
@@ -23,38 +23,27 @@ def clip_of(context):
     return getattr(context.space_data, "clip", None)
 
 
-class MU_OT_track(bpy.types.Operator):
+class _OnClip(RootOperator):
+    find_root = staticmethod(clip_of)
+    no_root, root_name, linked_too = NO_CLIP, "clip", True
+    trouble = unless(lambda clip: clip.tracking.tracks, "Place markers first: Ctrl-click them in the clip")
+
+
+@operator(_OnClip, "Track Markers")
+def track(operator, context, clip):
     """Track the selected markers, or all, from this frame to the end of the clip"""
-
-    bl_label = "Track Markers"
-    bl_options = {"REGISTER", "UNDO"}
-
-    @classmethod
-    def poll(cls, context):
-        clip = clip_of(context)
-        if clip is None:
-            cls.poll_message_set(NO_CLIP)
-            return False
-        if not clip.tracking.tracks:
-            cls.poll_message_set("Place markers first: Ctrl-click them in the clip")
-            return False
-        return True
-
-    def execute(self, context):
-        clip, scene = clip_of(context), context.scene
-        every = list(clip.tracking.tracks)
-        chosen = [track for track in every if track.select] or every
-        tracking.prepare(chosen, clip.mu_bench.marks)
-        for track in chosen:
-            track.select = True
-        # Blender's tracker stops at the scene's end, and loses its markers beyond the clip's.
-        end = clip.frame_start + clip.frame_duration - 1
-        if scene.frame_end > end:
-            self.report({"INFO"}, f"The scene ended at frame {scene.frame_end}, and ends with the clip now")
-        scene.frame_end = end
-        how = "EXEC_DEFAULT" if bpy.app.background else "INVOKE_DEFAULT"
-        bpy.ops.clip.track_markers(how, backwards=False, sequence=True)
-        return {"FINISHED"}
+    scene, every = context.scene, list(clip.tracking.tracks)
+    chosen = [track for track in every if track.select] or every
+    tracking.prepare(chosen, clip.mu_bench.marks)
+    for track in chosen:
+        track.select = True
+    # Blender's tracker stops at the scene's end, and loses its markers beyond the clip's.
+    end = clip.frame_start + clip.frame_duration - 1
+    if scene.frame_end > end:
+        operator.report({"INFO"}, f"The scene ended at frame {scene.frame_end}, and ends with the clip now")
+    scene.frame_end = end
+    how = "EXEC_DEFAULT" if bpy.app.background else "INVOKE_DEFAULT"
+    bpy.ops.clip.track_markers(how, backwards=False, sequence=True)
 
 
 class MU_OT_track_write(bpy.types.Operator):

@@ -98,63 +98,53 @@ def rebuild(root):
         raise InputError(root.mu_unit.trouble)
 
 
-class MU_OT_fit(UnitOperator, bpy.types.Operator):
+@operator(
+    UnitOperator,
+    "Use the Value That Fits",
+    # The full rule, for which the head of the panel may have no room.
+    tip=lambda context, given: given.why and f"{given.why}\n\nSet the nearest value that fits",
+    section=StringProperty(name="Section", description="Section of the parameter: chambers, lattice ..."),
+    name=StringProperty(name="Parameter", description="Name of the parameter"),
+    why=StringProperty(options={"HIDDEN", "SKIP_SAVE"}),
+)
+def fit(root, section, name):
     """Set a parameter to the nearest value that keeps every design rule"""
-
-    bl_label = "Use the Value That Fits"
-
-    section: StringProperty(name="Section", description="Section of the parameter: chambers, lattice ...")
-    name: StringProperty(name="Parameter", description="Name of the parameter")
-    why: StringProperty(options={"HIDDEN", "SKIP_SAVE"})
-
-    @classmethod
-    def description(cls, context, properties):
-        """The full rule, for which the head of the panel may have no room."""
-        return f"{properties.why}\n\nSet the nearest value that fits" if properties.why else cls.__doc__
-
-    def act(self, context, root):
-        found, value = broken(root), None
-        if found is not None:
-            mending = {(r.section, r.name): r.value for r in found.repairs}
-            value = mending.get((self.section, self.name), found.fits.get((self.section, self.name)))
-        if value is None:
-            raise InputError(
-                f"{self.section}.{self.name} breaks no rule that another value would satisfy",
-                "design",
-                "change another field",
-            )
-        setattr(getattr(root.mu_unit, self.section), self.name, value)
-        # Another rule may still be broken, and has its own button.
-        unit_object.rebuild(root)
+    found, value = broken(root), None
+    if found is not None:
+        mending = {(r.section, r.name): r.value for r in found.repairs}
+        value = mending.get((section, name), found.fits.get((section, name)))
+    if value is None:
+        what = f"{section}.{name} breaks no rule that another value would satisfy"
+        raise InputError(what, "design", "change another field")
+    setattr(getattr(root.mu_unit, section), name, value)
+    # Another rule may still be broken, and has its own button.
+    unit_object.rebuild(root)
 
 
-class MU_OT_fit_all(UnitOperator, bpy.types.Operator):
+def _what_fits(context, properties):
+    """Parameters and their new values."""
+    root = unit_object.active_root(context)
+    found = None if root is None else broken(root)
+    return "\n".join([str(fit_all.__doc__), *_repairs_in_words(root, found)]) if found else ""
+
+
+@operator(UnitOperator, "Fix All", tip=_what_fits)
+def fit_all(operator, root):
     """Set every parameter that breaks a rule to the nearest round value that keeps all of them"""
-
-    bl_label = "Fix All"
-
-    @classmethod
-    def description(cls, context, properties):
-        """Parameters and their new values."""
-        root = unit_object.active_root(context)
-        found = None if root is None else broken(root)
-        return "\n".join([cls.__doc__, *_repairs_in_words(root, found)]) if found else cls.__doc__
-
-    def act(self, context, root):
-        found = broken(root)
-        if found is None or not found.repairs:
-            raise InputError("no rule is broken", "design", "there is nothing to do")
-        changes = _repairs_in_words(root, found)
-        with updates.paused():
-            for repair in found.repairs:
-                if repair.value is not None:
-                    group = getattr(root.mu_unit, repair.section)
-                    for name, value in tied({repair.name: repair.value}).items():
-                        setattr(group, name, value)
-        if not unit_object.rebuild(root):
-            self.report({"ERROR"}, root.mu_unit.trouble)
-        else:
-            self.report({"INFO"}, f"Set {', '.join(changes)}")
+    found = broken(root)
+    if found is None or not found.repairs:
+        raise InputError("no rule is broken", "design", "there is nothing to do")
+    changes = _repairs_in_words(root, found)
+    with updates.paused():
+        for repair in found.repairs:
+            if repair.value is not None:
+                group = getattr(root.mu_unit, repair.section)
+                for name, value in tied({repair.name: repair.value}).items():
+                    setattr(group, name, value)
+    if not unit_object.rebuild(root):
+        operator.report({"ERROR"}, root.mu_unit.trouble)
+    else:
+        operator.report({"INFO"}, f"Set {', '.join(changes)}")
 
 
 def _repairs_in_words(root, found) -> list[str]:
@@ -178,12 +168,7 @@ def millimetres(context):
     _use_millimetres(context)
 
 
-class MU_OT_select(UnitOperator, bpy.types.Operator):
+@operator(UnitOperator, "Select Unit", linked_too=True)
+def select(context, root):
     """Select the unit itself, alone, if a display of it is the active object"""
-
-    bl_label = "Select Unit"
-
-    linked_too = True
-
-    def act(self, context, root):
-        unit_object.make_active(context, root)
+    unit_object.make_active(context, root)

@@ -6,14 +6,13 @@ import re
 from pathlib import Path
 
 import attrs
-import bpy
 from bpy.props import StringProperty
 
 from ...design.parameters import Unit, load_preset, preset_names, read_unit, write_unit
 from ...errors import InputError, OutputError
 from ..shared import updates
 from ..shared.compat import user_folder
-from ..shared.operators import operator, reports_errors
+from ..shared.operators import FreeOperator, operator
 from . import object as unit_object
 from .base_classes import UnitOperator
 from .properties import from_unit, to_unit
@@ -82,35 +81,31 @@ def preset_load(root, name):
     unit_object.rebuild(root)
 
 
-class MU_OT_preset_save(UnitOperator, bpy.types.Operator):
+def _ask_name(operator, context, event):
+    operator.name = unit_object.active_root(context).mu_unit.title
+    return context.window_manager.invoke_props_dialog(operator)
+
+
+@operator(
+    UnitOperator,
+    "Save Preset",
+    undo=False,
+    invoke=_ask_name,
+    name=StringProperty(name="Name", description="Name of your preset", default="my unit"),
+)
+def preset_save(operator, root, name):
     """Save the unit's parameters as your own preset, a TOML file that headless/run.py also reads"""
-
-    bl_label = "Save Preset"
-    bl_options = {"REGISTER"}
-
-    name: StringProperty(name="Name", description="Name of your preset", default="my unit")
-
-    def invoke(self, context, event):
-        self.name = unit_object.active_root(context).mu_unit.title
-        return context.window_manager.invoke_props_dialog(self)
-
-    def act(self, context, root):
-        kept = save(to_unit(root.mu_unit), self.name)
-        self.report({"INFO"}, f"Preset {kept.removeprefix(USER)} saved")
+    kept = save(to_unit(root.mu_unit), name)
+    operator.report({"INFO"}, f"Preset {kept.removeprefix(USER)} saved")
 
 
-class MU_OT_preset_remove(bpy.types.Operator):
+@operator(
+    FreeOperator,
+    "Remove Preset",
+    undo=False,
+    invoke=lambda operator, context, event: context.window_manager.invoke_confirm(operator, event),
+    name=StringProperty(name="Preset", description="Name of your preset"),
+)
+def preset_remove(name):
     """Remove a preset of your own"""
-
-    bl_label = "Remove Preset"
-    bl_options = {"REGISTER"}
-
-    name: StringProperty(name="Preset", description="Name of your preset")
-
-    def invoke(self, context, event):
-        return context.window_manager.invoke_confirm(self, event)
-
-    @reports_errors
-    def execute(self, context):
-        remove(self.name)
-        return {"FINISHED"}
+    remove(name)

@@ -1,9 +1,9 @@
 """Requests to the process that bends a unit live; no solver is loaded.
 
 request.json: `number` of the latest request, whose study is in `asked/NUMBER`, `pressure_kPa`, found first,
-and `fields`, whether stress and stretch are asked for. bent.json: `number` of the request that it answers,
-`folder` of the motion, `states` as pairs of kPa and degrees, relative `error` of the angle, `finished`, and
-`trouble` if no shape was found.
+`fields`, whether stress and stretch are asked for, and `shapes`, the folder in which found ones are kept.
+bent.json: `number` of the request that it answers, `folder` of the motion, `states` as pairs of kPa and
+degrees, relative `error` of the angle, `finished`, and `trouble` if no shape was found.
 """
 
 from __future__ import annotations
@@ -32,11 +32,18 @@ def trouble_of(study: UnitStudy) -> str:
     return ""
 
 
-def ask(folder: Path, number: int, study: UnitStudy, pressure_kPa: float, fields: bool = False) -> None:
+def ask(
+    folder: Path,
+    number: int,
+    study: UnitStudy,
+    pressure_kPa: float,
+    fields: bool = False,
+    shapes: Path | None = None,
+) -> None:
     """Write a request to the process of a folder: bend this study's unit. Raises InputError, OutputError.
 
     pressure_kPa: found first, and above the protocol's pressures the largest. fields: find stress and
-    stretch, too, after the shape.
+    stretch, too, after the shape. shapes: folder in which its shapes are kept (`known`), None for none.
     """
     from ...files import write_json
     from ...studies.starting import write_study
@@ -48,4 +55,6 @@ def ask(folder: Path, number: int, study: UnitStudy, pressure_kPa: float, fields
     if reason := trouble_of(study):
         raise InputError(reason, "live bending", "switch it off, or change the unit")
     write_study(study, folder / ASKED / str(number))
-    write_json(folder / REQUEST, {"number": number, "pressure_kPa": pressure_kPa, "fields": fields})
+    kept = "" if shapes is None or study.body is not None or study.effects else str(shapes)
+    asked = {"number": number, "pressure_kPa": pressure_kPa, "fields": fields, "shapes": kept}
+    write_json(folder / REQUEST, asked)

@@ -21,7 +21,7 @@ from ...body.morph import PrintedMorph
 from ...body.printed_mesh import mesh_printed
 from ...design.dimensions import Dimensions
 from ...design.quantity import in_kPa, in_MPa
-from ...errors import ConvergenceError, InputError, MeshingError, MuError
+from ...errors import ConvergenceError, InputError, MeshingError, MuError, OutputError
 from ...fem.bending_angle import TipSection
 from ...fem.equilibrium import Equilibrium
 from ...fem.model import Model
@@ -32,8 +32,9 @@ from ...fem.trajectory import Trajectory
 from ...files import write_json
 from ...meshing.mesh import Mesh
 from ...reading import file_bytes, parse_json
-from ...report.motion_files import Surface, SurfaceFields, surfaces_of, write_model_a
+from ...report.motion_files import Surface, SurfaceFields, read_motion, surfaces_of, write_model_a
 from ...studies.unit_ranking import UnitStudy as Study
+from . import known
 from .requests import ASKED, BENT, CELLS, LEVELS, REQUEST
 
 Array = np.ndarray[Any, Any]
@@ -112,6 +113,7 @@ class LiveBending:
         self._shape = 0
         self._levels: dict[float, _Solved] = {}
         self._seen: tuple[int, dict[str, Any]] = 0, {}
+        self._told: dict[str, Any] = {}
 
     def request(self) -> dict[str, Any]:
         """The latest request; empty before the first."""
@@ -137,6 +139,10 @@ class LiveBending:
                         _ = self._levels[LEVELS[0][0]].drawn.morph
                     self._rest()
                 self._level(study, refine, error, float(request["pressure_kPa"]), bool(request["fields"]))
+                if request["shapes"]:
+                    with suppress(OutputError):
+                        motion = read_motion(self.folder / self._told["folder"])
+                        known.keep(motion, self._told, study.unit, Path(request["shapes"]))
         except _Superseded:
             pass
         except MuError as error:
@@ -236,8 +242,9 @@ class LiveBending:
         surfaces = found.drawn.surfaces
         write_model_a(folder, found.mesh, materials, motion, fields=fields, surfaces=surfaces)
         angles = [[state.pressure_kPa, tip.angle_deg(state.u)] for state in states]
-        answer = {"number": self._number, "folder": folder.name, "states": angles}
-        write_json(self.folder / BENT, answer | {"error": error, "finished": finished, "trouble": ""})
+        self._told = {"number": self._number, "folder": folder.name, "states": angles}
+        self._told |= {"error": error, "finished": finished, "trouble": ""}
+        write_json(self.folder / BENT, self._told)
         self._remove(f"shape-{k}" for k in (self._shape - 2,))
         self._remove(f"{ASKED}/{self._number - k}" for k in range(1, 4))
 

@@ -69,7 +69,7 @@ def _said(draw, status_bar):
 
 def told(operator, **settings):
     """The tooltip of a button of the header."""
-    return getattr(header, f"MU_OT_{operator}").description(bpy.context, SimpleNamespace(**settings))
+    return getattr(bpy.types, f"MU_OT_{operator}").description(bpy.context, SimpleNamespace(**settings))
 
 
 def test_one_runs_the_others_wait_and_each_ends_with_a_notice(monkeypatch):

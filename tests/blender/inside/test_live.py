@@ -132,13 +132,28 @@ def test_a_unit_bends_at_the_sliders_pressure_and_anew_after_a_change(tmp_path):
     assert not folder.exists()
     assert child.state == "failed" or child.state == "cancelled"
     root.mu_unit.show = "solid"
+    root.mu_unit.chambers.wall_mm = 0.9
     root.mu_live.on = True
     assert root.mu_unit.show == "preview", "the bend that was asked for is shown"
+    root.mu_live.pressure_kPa = 40.0
+    live._tick()
+    assert live.is_seen(root), "found before, in whatever session: at once"
+    assert live.of(root).child is None
+    assert np.allclose(lattice(root), at_40, atol=1e-3)
+    assert words.words(root).startswith(f"{angle:.1f} ± ")
+    root.mu_unit.chambers.neck_diameter_mm = 13.5
+    live._tick()
+    assert words.words(root) == "Bending... (dim: the shape before)"
+    root.mu_live.on = False
+    root.mu_live.on = True
+    live._tick()
+    assert words.words(root) == "Bending... (dim: a unit like it)"
     root.mu_live.on = False
 
 
 def test_a_real_job_comes_first(monkeypatch, tmp_path):
     root = add(preset="mu-1.0x")
+    root.mu_unit.chambers.count = 3
     root.mu_unit.study.folder = str(tmp_path / "unit")
     root.mu_live.on = True
     live.of(root).due_s = 0.0

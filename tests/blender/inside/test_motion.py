@@ -423,7 +423,7 @@ def test_candidates_say_their_rank(study):
     assert len({tuple(t.data.materials[0].diffuse_color) for t in tubes.values()}) == 10
     # The tooltip of a row in the list shows its path in the lattice; of the chosen one's, too.
     for asked, shown in (("alpha2", "alpha2"), ("none", "alpha4")):
-        picking.MU_OT_path.description(bpy.context, SimpleNamespace(name=asked))
+        bpy.types.MU_OT_path.description(bpy.context, SimpleNamespace(name=asked))
         assert hover._listed == shown
     hover._let_go()
     assert hover._listed == ""

@@ -12,7 +12,6 @@ from mu_addon.blender.jobs import start_child as jobs
 from mu_addon.blender.printing import layer, marks
 from mu_addon.blender.printing import panel as print_panel
 from mu_addon.blender.printing import state as printing
-from mu_addon.blender.printing.operators import MU_OT_print_export as operator
 from mu_addon.blender.results import runs
 from mu_addon.blender.sidebar import unit_panel
 from mu_addon.blender.simulate import study_folder as studies
@@ -89,7 +88,7 @@ def test_a_check_from_start_to_markers(tmp_path):
     assert found.folder.parent == studies.folder_of(root)
     faults = [f for f in found.content["findings"] if f["severity"] in ("error", "warning")]
     assert faults
-    assert not printing.errors(found)
+    assert not printing.errors(root)
     texts = drawn()
     for fault in faults:
         assert fault["check"].capitalize() in texts
@@ -309,8 +308,12 @@ def test_an_export_as_chosen(tmp_path, monkeypatch):
             asked.update(words)
             return {"RUNNING_MODAL"}
 
-    context = MagicMock(wraps=bpy.context, window_manager=Manager(), object=root)
-    assert operator.invoke(MagicMock(), context, None) == {"RUNNING_MODAL"}
+        fileselect_add = invoke_confirm
+
+    context, pressed = MagicMock(wraps=bpy.context, window_manager=Manager(), object=root), MagicMock()
+    assert bpy.types.MU_OT_export_stl.invoke(pressed, context, None) == {"RUNNING_MODAL"}
+    pressed.report.assert_called_once_with({"WARNING"}, "The check found: chamber wall. Do not print this")
+    assert bpy.types.MU_OT_print_export.invoke(MagicMock(), context, None) == {"RUNNING_MODAL"}
     assert "chamber wall" in asked["message"]
     assert not jobs.running()
 

@@ -336,7 +336,7 @@ def test_a_field_that_the_run_has_not_is_refused_with_what_to_do(home):
     root = unit_object.active_root(bpy.context)
     assert field_operators.lacking(root, "von_mises_kPa") == ""
     for field, words in (("contact_pressure_kPa", "without self-contact"), ("von_mises_kPa", "")):
-        kind = field_operators.MU_OT_field_show
+        kind = bpy.types.MU_OT_field_show
         text = kind.description(bpy.context, SimpleNamespace(field=field))
         assert (f"Not here: this run was simulated {words}" in text) == bool(words)
     assert "no map of the sensitivity" in refused(bpy.ops.mu.field_show, field="dJ_by_modulus_mm_per_MPa")
