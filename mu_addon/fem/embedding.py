@@ -22,8 +22,8 @@ _NEIGHBOURS = 16
 # A smaller Newton step in reference coordinates is not followed by another.
 _SETTLED = 1e-9
 # Of elements that a point lies in or near to equally, to within this in reference coordinates or mm, the one
-# with the nearest middle is taken, then the first: beyond them each continues the displacement in its own way,
-# and rounding is not the same in every library.
+# with the nearest middle is taken, then the first: beyond them each continues the displacement in its own
+# way, and rounding is not the same in every library.
 _ALIKE = 1e-9
 
 

@@ -10,6 +10,7 @@ from bpy.props import BoolProperty, CollectionProperty, StringProperty
 from ...design.printing.finding import counted
 from ...errors import InputError, MuError
 from ...files import make_folder
+from ..jobs import prepared, start_child
 from ..jobs.here import run_here
 from ..shared import viewports
 from ..shared.operators import choose_file, open_file, operator
@@ -100,8 +101,10 @@ def import_page(context, root):
     """Open the page that shows how the files were read"""
     from ...studies.import_ import PAGE
 
-    page = _folder(root) / PAGE
-    if not page.exists():
+    if start_child.runs(_page_job(root)):
+        raise InputError("The page is being drawn: press again in a moment")
+    page = next((place / PAGE for place in (_drawn(root), _folder(root)) if (place / PAGE).exists()), None)
+    if page is None:
         raise InputError("Nothing was imported into this folder: choose Import Files first")
     open_file(context, page)
 
@@ -112,10 +115,30 @@ def _folder(root):
     return Path(bpy.path.abspath(given)) if given else studies.assign_folder(root) / FOLDER
 
 
+def _page_job(root) -> str:
+    return f"{root.mu_unit.uuid}:import page"
+
+
+def _drawn(root) -> Path:
+    """Folder of the page that a process drew."""
+    return studies.folder_of(root) / "import"
+
+
+def _draw_page(root, work) -> None:
+    """Draw the page on an import, in a window by a process of its own, which its charts would hold."""
+    if prepared.at_once():
+        from ...report.study_page import write_page
+
+        write_page(work)
+        return
+    answers = [f"--set={key}={value}" for key, value in work.study.answers.items()]
+    line = ["import", *map(str, work.study.paths), *answers, "--dry-run", "--json"]
+    child = start_child.start([*line, "--out", str(_drawn(root))], _drawn(root), ends_with_parent=True)
+    start_child.watch(_page_job(root), child)
+
+
 def _import(operator, root):
     """Import the experiments without open questions; the panel shows the questions left."""
-    # Imported late: charts need matplotlib.
-    from ...report.study_page import write_page
     from ...studies.import_ import Import
 
     state = root.mu_import
@@ -123,7 +146,7 @@ def _import(operator, root):
     files, folder = tuple(map(Path, state.files.split("\n"))), _folder(root)
     make_folder(folder)
     work, warnings = run_here(Import(paths=files, answers=given), folder)
-    write_page(work)
+    _draw_page(root, work)
     found = work.results.value(("understood", None))
     if work.fault is not None:
         for p, question in found.asked:

@@ -51,6 +51,7 @@ WRITERS = (
     "mu_addon.studies.export",
     "mu_addon.studies.specimens",
     "mu_addon.studies.check",
+    "mu_addon.studies.import_",
     "pyparsing",
     "PIL.Image",
     "PIL.PngImagePlugin",

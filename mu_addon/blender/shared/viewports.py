@@ -76,13 +76,20 @@ def between_sides(area: Any) -> float:
     return max(1.0 - 2.0 * max(over, default=0.0) / max(region.width, 1), 0.3)
 
 
+def below_headers(area: Any) -> float:
+    """Share of a view's height, about its middle, that the headers over it leave clear."""
+    region = next(region for region in area.regions if region.type == "WINDOW")
+    over = [other.height for other in area.regions if other.type in ("HEADER", "TOOL_HEADER")]
+    return max(1.0 - 2.0 * sum(over) / region.height, 0.3) if region.height >= area.height > 1 else 1.0
+
+
 def holds(area: Any, points: Any) -> bool:
-    """Return True if all points (n, 3) are within a view, between toolbar and sidebar over it."""
+    """Return True if all points (n, 3) are within a view, clear of toolbar, sidebar and headers over it."""
     projected = (
         np.column_stack([points, np.ones(len(points))])
         @ np.array(area.spaces.active.region_3d.perspective_matrix).T
     )
-    limits = np.array([between_sides(area), 1.0])
+    limits = np.array([between_sides(area), below_headers(area)])
     return bool((np.abs(projected[:, :2]) <= limits * projected[:, 3:]).all())
 
 

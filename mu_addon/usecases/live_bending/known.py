@@ -47,11 +47,11 @@ def keep(motion: Motion, answer: dict[str, Any], unit: Unit, shapes: Path) -> No
     place = shapes / attrs.evolve(unit, name="unit").hash()[:16]
     shutil.rmtree(place, ignore_errors=True)
     nodes = np.unique(np.concatenate([surface.node for surface in motion.surfaces.values()]))
-    arrays = {"nodes": motion.mesh.nodes[nodes], "symmetry": np.array(motion.mesh.symmetry, "U1")}
+    arrays = {"nodes": _short(motion.mesh.nodes[nodes]), "symmetry": np.array(motion.mesh.symmetry, "U1")}
     arrays |= {name: np.zeros((0, 10), np.int32) for name in ("tets", "cavity")}
     arrays |= {name: np.zeros(0, np.int32) for name in ("region", "base", "tip")}
     moved = {name: getattr(motion, name) for name in ("time_s", "pressure_kPa", "state", "state_kPa")}
-    moved["displacement_mm"] = motion.model_a[:, nodes].astype(np.float32)
+    moved["displacement_mm"] = _short(motion.model_a[:, nodes])
     for region, surface in motion.surfaces.items():
         arrays[f"{region}_node"] = np.searchsorted(nodes, surface.node)
         arrays |= {f"{region}_triangles": surface.triangles, f"{region}_cut": surface.cut}
@@ -64,6 +64,11 @@ def keep(motion: Motion, answer: dict[str, Any], unit: Unit, shapes: Path) -> No
     latest = sorted(shapes.glob(f"*/{UNIT}"), key=lambda path: path.stat().st_mtime)
     for path in latest[:-KEPT]:
         shutil.rmtree(path.parent, ignore_errors=True)
+
+
+def _short(lengths_mm: Any) -> Any:
+    """Lengths to 0.002 mm, whose last digits a packed file does not hold."""
+    return np.ldexp(np.round(np.ldexp(lengths_mm, 9)), -9).astype(np.float32)
 
 
 def nearest(unit: Unit, *shapes: Path) -> Known | None:
