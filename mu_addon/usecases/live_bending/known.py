@@ -122,7 +122,7 @@ def _apart(one: Unit, other: Unit) -> float:
         for d in describe(section) if section is not Waveguide else ():
             if d.name in (*_UNFELT, "membrane_modulus_kPa"):
                 continue
-            a, b = (getattr(getattr(unit, section.section), d.name) for unit in (one, other))
+            a, b = (getattr(getattr(unit, getattr(section, "section", "")), d.name) for unit in (one, other))
             if d.fixed:
                 a, b = a / one.scale, b / other.scale
             if a != b:

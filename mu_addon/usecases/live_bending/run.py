@@ -113,7 +113,7 @@ class LiveBending:
         self._shape = 0
         self._levels: dict[float, _Solved] = {}
         self._seen: tuple[int, dict[str, Any]] = 0, {}
-        self._told: dict[str, Any] = {}
+        self._answer: dict[str, Any] = {}
 
     def request(self) -> dict[str, Any]:
         """The latest request; empty before the first."""
@@ -141,8 +141,8 @@ class LiveBending:
                 self._level(study, refine, error, float(request["pressure_kPa"]), bool(request["fields"]))
                 if request["shapes"]:
                     with suppress(OutputError):
-                        motion = read_motion(self.folder / self._told["folder"])
-                        known.keep(motion, self._told, study.unit, Path(request["shapes"]))
+                        motion = read_motion(self.folder / self._answer["folder"])
+                        known.keep(motion, self._answer, study.unit, Path(request["shapes"]))
         except _Superseded:
             pass
         except MuError as error:
@@ -242,9 +242,9 @@ class LiveBending:
         surfaces = found.drawn.surfaces
         write_model_a(folder, found.mesh, materials, motion, fields=fields, surfaces=surfaces)
         angles = [[state.pressure_kPa, tip.angle_deg(state.u)] for state in states]
-        self._told = {"number": self._number, "folder": folder.name, "states": angles}
-        self._told |= {"error": error, "finished": finished, "trouble": ""}
-        write_json(self.folder / BENT, self._told)
+        self._answer = {"number": self._number, "folder": folder.name, "states": angles}
+        self._answer |= {"error": error, "finished": finished, "trouble": ""}
+        write_json(self.folder / BENT, self._answer)
         self._remove(f"shape-{k}" for k in (self._shape - 2,))
         self._remove(f"{ASKED}/{self._number - k}" for k in range(1, 4))
 
