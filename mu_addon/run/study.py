@@ -522,7 +522,8 @@ class Study:
     @classmethod
     def all_stages(cls) -> dict[str, Stage]:
         """Its stages by name, each after those that it needs."""
-        return _marked(cls, _STAGE)
+        # One function may be several stages, which differ by their sets.
+        return {name: attrs.evolve(one, name=name) for name, one in _marked(cls, _STAGE).items()}
 
     @classmethod
     def sections(cls) -> list[Section]:

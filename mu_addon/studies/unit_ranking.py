@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from contextlib import suppress
 from functools import cached_property
 from typing import Any
@@ -125,6 +125,24 @@ def _remark(summary: Mapping[str, Any]) -> str:
     angles = {float(p): a for p, a in (summary.get("angle_deg") or {}).items()}
     words = [f"{angles[p]:.1f}° at {p:g} kPa" for p in (max(angles),)] if angles else []
     return ", ".join([*filter(None, [summary.get("chosen")]), *words])
+
+
+def _solves(wanted: Callable[[UnitStudy], bool], **growing: Any) -> Any:
+    """A stage of candidates at some pressures, each from Model A's states there."""
+
+    def solved(
+        self: None,
+        number: int,
+        pressures_kPa: tuple[float, ...],
+        states: Members,
+        waveguides: Any,
+        stations: int,
+    ) -> core.Solved:
+        return core.solved(waveguides, number, pressures_kPa, states, stations)
+
+    over = Over(("number", "pressures_kPa"), lambda study: [], _way, _at_pressures, **growing)
+    words: Any = {"says": lambda found: core.words_on_solved(found), "doing": _sought}
+    return stage("candidates", taking("candidates"), over=over, wanted=wanted, parallel=True, **words)(solved)
 
 
 @attrs.frozen(kw_only=True, eq=False, slots=False)
@@ -322,32 +340,12 @@ class UnitStudy(UnitMotion):
         """Solver of the candidates."""
         return core.waveguides_of(mechanics, meshed, candidate_paths)
 
-    @stage(
-        "candidates",
-        taking("candidates"),
-        over=Over(
-            ("number", "pressures_kPa"),
-            lambda study: [],
-            _way,
-            _at_pressures,
-            grows=lambda study: core.solving(study.compared, study.contest, begin=True),
-            most=lambda study: len(study.candidate_paths) + study.contest.best,
-        ),
-        wanted=_by_pressure,
-        parallel=True,
-        says=lambda found: core.words_on_solved(found),
-        doing=_sought,
+    candidates = _solves(
+        _by_pressure,
+        grows=lambda study: core.solving(study.compared, study.contest, begin=True),
+        most=lambda study: len(study.candidate_paths) + study.contest.best,
     )
-    def candidates(
-        self,
-        number: int,
-        pressures_kPa: tuple[float, ...],
-        states: Members,
-        waveguides: Any,
-        stations: int,
-    ) -> core.Solved:
-        """A candidate at some pressures, from Model A's states there."""
-        return core.solved(waveguides, number, pressures_kPa, states, stations)
+    """All candidates at the first pressures, the most promising ones at all."""
 
     @intermediate()
     def begun(self, compared: core.Comparison, contest: Any, candidates: Members) -> core.Standing:
@@ -355,33 +353,13 @@ class UnitStudy(UnitMotion):
         found: core.Standing = grown(core.solving(compared, contest, begin=True), candidates)
         return found
 
-    @stage(
-        "candidates",
-        taking("candidates"),
-        over=Over(
-            ("number", "pressures_kPa"),
-            lambda study: [],
-            _way,
-            _at_pressures,
-            grows=lambda study, begun: core.solving(study.compared, study.contest, begun),
-            most=lambda study: len(study.candidate_paths) - study.contest.best,
-            after=("begun",),
-        ),
-        wanted=_by_pressure,
-        parallel=True,
-        says=lambda found: core.words_on_solved(found),
-        doing=_sought,
+    contenders = _solves(
+        _by_pressure,
+        grows=lambda study, begun: core.solving(study.compared, study.contest, begun),
+        most=lambda study: len(study.candidate_paths) - study.contest.best,
+        after=("begun",),
     )
-    def contenders(
-        self,
-        number: int,
-        pressures_kPa: tuple[float, ...],
-        states: Members,
-        waveguides: Any,
-        stations: int,
-    ) -> core.Solved:
-        """A candidate that may still be among the best, at what it lacks."""
-        return core.solved(waveguides, number, pressures_kPa, states, stations)
+    """Candidates that may still be among the best, at what they lack."""
 
     @intermediate()
     def standing(
@@ -591,32 +569,12 @@ class UnitStudy(UnitMotion):
             coarse_marched,
         )
 
-    @stage(
-        "candidates",
-        taking("candidates"),
-        over=Over(
-            ("number", "pressures_kPa"),
-            lambda study: [],
-            _way,
-            _at_pressures,
-            grows=lambda study, *found: core.letting_in(study.compared, study.contest, *found),
-            after=("standing", "path_check", "uncertainty"),
-        ),
-        wanted=_checks_by_pressure,
-        parallel=True,
-        says=lambda found: core.words_on_solved(found),
-        doing=_sought,
+    let_in = _solves(
+        _checks_by_pressure,
+        grows=lambda study, *found: core.letting_in(study.compared, study.contest, *found),
+        after=("standing", "path_check", "uncertainty"),
     )
-    def let_in(
-        self,
-        number: int,
-        pressures_kPa: tuple[float, ...],
-        states: Members,
-        waveguides: Any,
-        stations: int,
-    ) -> core.Solved:
-        """A candidate that the mesh uncertainty does not tell from the best, at what it lacks."""
-        return core.solved(waveguides, number, pressures_kPa, states, stations)
+    """Candidates that the mesh uncertainty does not tell from the best, at what they lack."""
 
     @intermediate()
     def last_standing(
