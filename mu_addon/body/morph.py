@@ -22,7 +22,7 @@ from ..meshing.mesh import Array, Mesh, mirror
 from ..meshing.morph import shrunk, struts_alone_differ
 from ..meshing.quality import check_positive
 from ..meshing.settings import MeshSettings
-from ..meshing.wall_grid import unmovable
+from ..meshing.wall_and_cavity import unmovable
 from .beams import Layers, rotation_nodes
 from .joints import zones_of
 from .lattice import clearance, cuts

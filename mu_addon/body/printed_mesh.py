@@ -16,7 +16,7 @@ from ..fem.embedding import embed
 from ..meshing.mesh import MEMBRANE, Array, Mesh, mirror, second_order
 from ..meshing.quality import check_positive
 from ..meshing.settings import CELL_MM, MeshSettings
-from ..meshing.wall_grid import Membrane, WallGrid
+from ..meshing.wall_and_cavity import Membrane, WallGrid
 from .beams import REACH, with_beams
 from .frame import frame_zones
 from .graph_beams import with_graph_beams

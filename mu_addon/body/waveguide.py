@@ -20,7 +20,7 @@ from ..errors import InputError
 from ..fem.embedding import embed
 from ..meshing.mesh import LATTICE, Array, Mesh, part
 from ..meshing.quality import check_positive
-from ..meshing.wall_grid import unmovable
+from ..meshing.wall_and_cavity import unmovable
 from .bar import bar_mesh, is_own_mirror_image, outside_bar, outside_seat, seat_mesh
 from .beams import REACH, without_beams
 from .graph_beams import graph_layers_of

@@ -24,6 +24,6 @@ if TYPE_CHECKING:
     from .surface import VOID as VOID
     from .surface import Surface as Surface
     from .surface import mesh_surface as mesh_surface
-    from .wall_grid import WallGrid as WallGrid
+    from .wall_and_cavity import WallGrid as WallGrid
 else:
     __getattr__, __dir__, __all__ = public_face(__name__)

@@ -5,8 +5,8 @@ from typing import TYPE_CHECKING
 from ..lazy import public_face
 
 if TYPE_CHECKING:
-    from .html import page as page
-    from .html import table as table
+    from .html_parts import page as page
+    from .html_parts import table as table
     from .pc2 import read_pc2 as read_pc2
     from .pc2 import write_pc2 as write_pc2
     from .render import Camera as Camera

@@ -13,7 +13,7 @@ from ..reading import file_bytes, file_text, parse_json
 from ..run.context import STOPPED
 from ..run.progress import spell
 from ..run.summary import SUMMARY
-from .html import facts_table, note, page, table
+from .html_parts import facts_table, note, page, table
 
 REPORT = "report.html"
 MOST_ROWS = 20

@@ -21,11 +21,11 @@ from .cache import REVISION, key
 from .cluster import Cluster
 from .context import KEEP_EVERY_S, RunContext
 from .inputs import digest
+from .kept_results import Results, Task
 from .parts import Fact, Fault, File, Part, Sentence, Warn, flat
 from .pool import Pool, WorkerDiedError
 from .progress import Progress
 from .progress_estimate import LOADED, LOADED_S, Plan
-from .results import Results, Task
 from .stored import content
 from .study import Dropped, Growth, Members, Section, Study
 

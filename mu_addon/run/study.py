@@ -15,7 +15,7 @@
         def result(self, stiffness: float) -> Iterator[Part]: ...
 
 Command, inputs' file, node, plan, cache, resume, report and summary follow (`execution`, `cli.studies`,
-`report.study_page`, `usecases.graph.studies`). The parameters of a stage name what it needs: inputs, values
+`report.study_report`, `usecases.graph.studies`). The parameters of a stage name what it needs: inputs, values
 derived from them, results of other stages. Nothing else can make its cached result stale. A declaration
 imports public faces of packages alone, which load when they are used.
 """
@@ -303,10 +303,10 @@ def stage(
     that the method declares, of arrays, numbers, texts and attrs classes of these; else it is made in
     each run. failing: words for a warning; an error of the stage then does not end the run, and what
     needs it is left out. revision: raise it when a change of the code changes the result. parallel:
-    members may be made in processes of their own, the study's `workers`, side by side with all other parallel
-    stages, the first ones first, or by the workers of its `scheduler`. again: True of a study and a result
-    that an earlier run kept and this one makes anew. says: a few words on a result, for its progress. doing:
-    words, of a study and a member, on what is made, for a progress that waits for it.
+    `execution.py` may hand members to processes of their own, the study's `workers`, side by side with all
+    other parallel stages, the first ones first, or to the workers of its `scheduler`. again: True of a study
+    and a result that an earlier run kept and this one makes anew. says: a few words on a result, for its
+    progress. doing: words, of a study and a member, on what is made, for a progress that waits for it.
     """
 
     if parallel and not kept:

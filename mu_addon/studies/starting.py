@@ -66,7 +66,7 @@ def begin_study(job: Study, folder: Path, context: RunContext) -> None:
 
 def _execute(job: Study, folder: Path, context: RunContext) -> Execution:
     """Make every result of a study, and report those that there are; the report of further targets stays."""
-    from ..report.study_page import write_page
+    from ..report.study_report import write_page
 
     work = Execution(job, folder, context)
     has_report = job.page and context.wants_report

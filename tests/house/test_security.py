@@ -21,7 +21,7 @@ UNLIMITED = {
     "mu_addon/blender/unit/resins.py": "a property of the unit",
     "mu_addon/blender/shared/operators.py": "a text that the user opens in Blender",
     "mu_addon/measured/table.py": "the text of a file read within its limit",
-    "mu_addon/report/html.py": "a part of the program",
+    "mu_addon/report/html_parts.py": "a part of the program",
     "mu_addon/report/pc2.py": "written the moment before",
     "mu_addon/run/child.py": "messages of a process of its own",
     "mu_addon/run/lock.py": "1000 bytes",

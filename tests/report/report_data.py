@@ -9,7 +9,7 @@ from mu_addon.design.parameters import load_preset
 from mu_addon.placement.candidates import Evaluation
 from mu_addon.placement.deviation import deviation_of
 from mu_addon.report.results import Path, SideView
-from mu_addon.report.study_page import page_of
+from mu_addon.report.study_report import page_of
 from mu_addon.run.context import RunContext
 from mu_addon.run.progress import Progress
 from mu_addon.studies.unit_ranking import UnitStudy

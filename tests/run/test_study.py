@@ -25,9 +25,9 @@ from mu_addon.errors import ConvergenceError, InputError, OutputError
 from mu_addon.run import execution
 from mu_addon.run.context import RunContext
 from mu_addon.run.execution import Execution
+from mu_addon.run.kept_results import Results
 from mu_addon.run.parts import Fact, File, Sentence, Warn, csv
 from mu_addon.run.progress import Progress
-from mu_addon.run.results import Results
 from mu_addon.run.stored import content, packed, unpacked
 from mu_addon.run.study import (
     Dropped,

@@ -28,8 +28,8 @@ from mu_addon.fem.protocol import Protocol as PressureProtocol
 from mu_addon.meshing.settings import MeshSettings
 from mu_addon.run.cache import Cache
 from mu_addon.run.context import RunContext, run_to_end
+from mu_addon.run.kept_results import Results
 from mu_addon.run.progress import Progress
-from mu_addon.run.results import Results
 from mu_addon.sensing.framing import info_frame, sample_frame
 from mu_addon.sensing.optics import Optics
 from mu_addon.sensing.recording import read_recording

@@ -10,7 +10,7 @@ import pytest
 from mu_addon.design.shapes import box
 from mu_addon.design.solid import printable
 from mu_addon.design.surface import stl_bytes
-from mu_addon.run.results import Results
+from mu_addon.run.kept_results import Results
 from mu_addon.studies import study
 from tests.golden.commands import COMMANDS
 from tests.golden.running import Workspace

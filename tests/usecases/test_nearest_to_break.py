@@ -6,9 +6,9 @@ import pytest
 from mu_addon.design.parameters import load_preset
 from mu_addon.fem.protocol import Protocol
 from mu_addon.meshing.settings import MeshSettings
+from mu_addon.run.kept_results import Results
 from mu_addon.run.parts import Fact, Warn
 from mu_addon.run.progress import Progress
-from mu_addon.run.results import Results
 from mu_addon.studies.unit_ranking import UnitStudy
 from mu_addon.usecases.simulate_and_place.motion_checks import would_tear
 

@@ -127,7 +127,7 @@ def _drawn(root) -> Path:
 def _draw_page(root, work) -> None:
     """Draw the page on an import, in a window by a process of its own, which its charts would hold."""
     if prepared.at_once():
-        from ...report.study_page import write_page
+        from ...report.study_report import write_page
 
         write_page(work)
         return

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from . import layers
+from . import layers, trapped_resin
 from .chambers import Chambers
 from .finding import Finding, Points, Severity, clustered, counted, judged
 from .printer import Limit, Printer
@@ -21,7 +21,7 @@ def build_findings(
     them from those outside. The limits are the printer's.
     """
     begun = layers.islands(built, layers.regions(built, free=False))
-    closed = layers.cups(built, layers.regions(built, free=True))
+    closed = trapped_resin.cups(built, layers.regions(built, free=True))
     over = layers.overhangs(built, printer["overhang_deg"])
     inner = chambers.hold(begun.places)
     found = [
@@ -53,7 +53,7 @@ def _islands(name: str, places: Points, printer: Printer, severity: Severity, re
     return judged(name, len(places) > 0, severity, what, float(len(places)), none, places, remedy, "")
 
 
-def _cups(closed: layers.Cups, printer: Printer) -> Finding:
+def _cups(closed: trapped_resin.Cups, printer: Printer) -> Finding:
     limit = printer.limits["cup_ml"]
     most = float(closed.volume[:1].sum()) / 1e3
     large = closed.volume / 1e3 > limit.value

@@ -10,8 +10,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..surface import Triangles, Vertices
-from .layers import cups, islands, regions
+from .layers import islands, regions
 from .thickness import Samples
+from .trapped_resin import cups
 from .voxels import frame_along, voxel_rows
 
 Array = NDArray[np.float64]

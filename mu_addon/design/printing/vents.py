@@ -19,8 +19,9 @@ from .. import shapes
 from ..gates import GateError
 from ..solid import printable
 from ..surface import Triangles, Vertices
-from .layers import cups, regions
+from .layers import regions
 from .printer import Printer
+from .trapped_resin import cups
 from .voxels import frame_along, voxel_rows
 
 Array = NDArray[np.float64]

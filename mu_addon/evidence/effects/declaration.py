@@ -1,5 +1,7 @@
 """What an effect is, declared whole in one file: texts, owner, kinship, laws, and how each law acts.
 
+No list says which effect rivals which: `rivals.py` finds that by what their laws do to the data.
+
 A simulator takes a quantity along its way, from a gauge's reading to a unit's state or from a strain to the
 force that is shown, and lets every law of the experiment's kind act at named places on it:
 

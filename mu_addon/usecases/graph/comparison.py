@@ -17,7 +17,7 @@ from ...files import write_csv
 from ...graph.evaluation import Finished
 from ...materials.library import load_material
 from ...reading import is_number
-from ...report.html import figure, number, table
+from ...report.html_parts import figure, number, table
 from ...report.plots import BY_LENGTH, BY_START, QUIET, canvas
 from ...run.summary import SUMMARY, read_summary
 from ...studies.starting import kind_of

@@ -6,7 +6,7 @@ from pathlib import Path
 
 from ...files import write_text
 from ...graph.evaluation import CACHED, COMPUTED, FAILED, Evaluation
-from ...report.html import cards, facts_table, note, page, table
+from ...report.html_parts import cards, facts_table, note, page, table
 from ...run.context import RunContext
 from ...run.progress import spell
 from ...run.versions import package_versions

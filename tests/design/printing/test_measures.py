@@ -6,7 +6,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from mu_addon.design import shapes
-from mu_addon.design.printing import chambers, faces, layers
+from mu_addon.design.printing import chambers, faces, layers, trapped_resin
 from mu_addon.design.printing.check import check
 from mu_addon.design.printing.crossing import MOST_CROSSINGS, crossings, near_pairs
 from mu_addon.design.printing.drainage import necks
@@ -120,7 +120,7 @@ def built(body, up=(0, 0, 1), step=0.2):
 
 def cups_of(body, up=(0, 0, 1)):
     grid = built(body, up)
-    return layers.cups(grid, layers.regions(grid, free=True, at_once=20_000))
+    return trapped_resin.cups(grid, layers.regions(grid, free=True, at_once=20_000))
 
 
 def bowl():

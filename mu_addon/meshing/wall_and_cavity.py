@@ -1,7 +1,7 @@
-"""The membrane and its two caps as a revolved structured grid, curved exactly where it is second order.
+"""The membrane, its two caps and the cavity in them, as a revolved structured grid.
 
 A wall of 0.6 mm along arcs that rise by up to 0.9 mm has no room for straight diagonals. One map from the
-profile therefore places its elements and all mid-edge nodes, not a mesher.
+profile therefore places its elements and all mid-edge nodes, curved exactly where it is second order.
 """
 
 from __future__ import annotations

@@ -11,7 +11,7 @@ from ..run.execution import Execution
 from ..run.parts import Beside, Chart, Fact, Part, Pictures, Sentence, Table, flat
 from ..run.progress import spell
 from ..run.versions import package_versions
-from .html import cards, facts_table, figure, note, number, page, picture_figure, table
+from .html_parts import cards, facts_table, figure, note, number, page, picture_figure, table
 from .plots import seconds as seconds_chart
 from .plots import signed
 from .stopped import NO_PICTURES
