@@ -46,23 +46,27 @@ class _Commands(argparse._SubParsersAction):
 class _Parser(argparse.ArgumentParser):
     """Reports an error in one line, with the closest valid word, and where help is."""
 
-    def parse_args(self, args: Any = None, namespace: Any = None) -> Any:
+    def parse_args(self, args: Any, namespace: Any = None) -> Any:  # type: ignore[override]
         """The options; an option that a command does not have ends the process, with what may be meant."""
+        # Before a missing one is reported, which may be the one that is meant.
+        for word in args[1:]:
+            if word.startswith("--"):
+                self._require_known(args[0], word.partition("=")[0])
         options, unknown = self.parse_known_args(args, namespace)
-        for word in unknown:
-            if word.startswith("-"):
-                self._refuse(options.command, word.partition("=")[0])
         if unknown:
             self.error(f"unexpected: {' '.join(unknown)}")
         return options
 
-    def _refuse(self, command: str, flag: str) -> None:
+    def _require_known(self, command: str, flag: str) -> None:
+        (choices,) = [action.choices for action in self._actions if isinstance(action, _Commands)]
+        of_command = choices[command]._actions if command in choices else ()
+        known = [own for action in of_command for own in action.option_strings]
+        if flag in known or not known:
+            return
         from ..design.parameters import SECTIONS
         from ..design.quantity import describe
         from ..errors import did_you_mean
 
-        (choices,) = [action.choices for action in self._actions if isinstance(action, _Commands)]
-        known = [own for action in choices[command]._actions for own in action.option_strings]
         name, hint = flag.lstrip("-").replace("-", "_"), did_you_mean(flag, known, 0.75)
         for section in () if hint else SECTIONS:
             table = str(section.section)  # type: ignore[attr-defined]

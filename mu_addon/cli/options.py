@@ -182,7 +182,6 @@ def unit_of(options: argparse.Namespace) -> Unit:
     """The unit that --preset or --unit names, with the wall of --resin; raises InputError."""
     from ..design.parameters import load_preset, read_unit
 
-    require_out(options)
     unit = load_preset(options.preset) if options.preset is not None else read_unit(options.unit)
     resin = getattr(options, "wall_resin", None)
     if resin is None:
@@ -190,12 +189,6 @@ def unit_of(options: argparse.Namespace) -> Unit:
     from ..materials.library import load_material, read_material
 
     return (read_material(resin) if resin.endswith(".toml") else load_material(resin)).in_unit(unit)
-
-
-def unit_if_named(options: argparse.Namespace) -> Unit | None:
-    """The unit that --preset or --unit names, or None if neither was given; raises InputError."""
-    require_out(options)
-    return None if options.preset is None and options.unit is None else unit_of(options)
 
 
 def modelled(

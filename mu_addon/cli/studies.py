@@ -21,7 +21,7 @@ from .options import (
     presets,
     require_out,
     sentence,
-    unit_if_named,
+    unit_of,
 )
 
 if TYPE_CHECKING:
@@ -41,8 +41,9 @@ def _unit(options: argparse.Namespace, context: RunContext, one: Any, values: di
         return modelled(options, context, whole=False)[0]
     from ..design.parameters import load_preset
 
-    found = unit_if_named(options)
-    return load_preset(one.default) if found is None and one.default else found
+    if options.preset is None and options.unit is None:
+        return load_preset(one.default) if one.default else None
+    return unit_of(options)
 
 
 def _add_gripper(command: Any, one: Any) -> None:

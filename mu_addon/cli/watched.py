@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
+import io
 import signal
 import sys
 from collections.abc import Callable, Sequence
-from contextlib import suppress
+from contextlib import redirect_stderr, suppress
 from functools import cache
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -61,7 +62,9 @@ def _heartbeat(line: Sequence[str]) -> Callable[[bytes], None]:
     def options() -> Any:
         from .main import parser
 
-        return parser().parse_args(list(line))
+        # Wrong ones are the worker's to refuse.
+        with redirect_stderr(io.StringIO()):
+            return parser().parse_args(list(line))
 
     def sink() -> Sink:
         from .main import sink_of
@@ -75,7 +78,7 @@ def _heartbeat(line: Sequence[str]) -> Callable[[bytes], None]:
 
     def hear(words: bytes) -> None:
         # Without a reader the worker ends by itself.
-        with suppress(ModuleNotFoundError, BrokenPipeError, MuError):
+        with suppress(ModuleNotFoundError, BrokenPipeError, MuError, SystemExit):
             heartbeat().hear(words)
 
     return hear

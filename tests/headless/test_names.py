@@ -45,7 +45,7 @@ def test_a_wrong_name_is_told_with_the_nearest(line, meant, capsys):
 def test_an_option_that_a_command_lacks_is_told_with_what_may_be_meant(option, told, capsys):
     """Not taken for one that begins alike; what the unit's file sets is no option."""
     with pytest.raises(SystemExit) as ended:
-        main(["simulate", "--preset", "mu-1.0x", "--out", "x", option, "3"])
+        main(["simulate", "--preset", "mu-1.0x", option, "3"])
     assert ended.value.code == 2
     words = capsys.readouterr().err
     assert told in words
