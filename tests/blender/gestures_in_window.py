@@ -1,4 +1,4 @@
-"""Runs inside a Blender with a window: some seventy gestures on units, trees, runs and results.
+"""Runs inside a Blender with a window of 1600 x 900: some seventy gestures on units, trees, runs and results.
 
 How long anything of the extension held the window, and what, is written to blocked.json in MU_TEST_FOLDER.
 With MU_HEARTBEAT it is how long anything held it, Blender's own work and drawing too: the longest time
@@ -14,10 +14,11 @@ from pathlib import Path
 import bpy
 
 sys.path.insert(0, str(Path(__file__).parent))
-from simulated import called, dragged_in_redo_panel, key, module, over_view, package, parts, run
+from simulated import called, drag, dragged_in_redo_panel, key, module, over_view, package, parts, run
 
 FOLDER = Path(os.environ["MU_TEST_FOLDER"])
 unit_object, trees = module("blender.unit.object"), module("blender.node_tree.state")
+stack = module("blender.unit.stack")
 handles, printing = module("blender.scene.handles"), module("blender.printing.state")
 results = module("blender.results.motion")
 studies, OPTIMIZATION = module("blender.simulate.study_folder"), module("blender.optimize.state").OPTIMIZATION
@@ -125,6 +126,65 @@ def until(condition):
 
 def settled():
     yield from until(lambda: not any(unit_object.behind(root) for root in roots()))
+
+
+def wall():
+    return only().mu_unit.chambers.wall_mm
+
+
+def by_mouse_and_keys():
+    """A unit from the menu by its name, its wall by a drag in the sidebar; each one undo step."""
+    for obj in list(bpy.data.objects):
+        bpy.data.objects.remove(obj)
+    parts()[1].spaces.active.show_region_ui = True
+    yield 3.0
+    parts()[2].active_panel_category = "MU"
+    yield 2.0
+    gesture('Shift A, "mono", Return')
+    over_view()
+    yield 2.0
+    key("A", shift=True)
+    yield 3.0
+    for letter in "mono":
+        key(letter.upper(), unicode=letter)
+        yield 1.5
+    key("RET")
+    yield 5.0
+    assert bpy.context.scene.unit_settings.scale_length == 1.0, "the scene's unit is the user's"
+    assert abs(only().dimensions.z - 0.081) < 1e-3, "and the unit has its true size in it"
+    gesture("a wall dragged in the sidebar")
+    region = parts()[2]
+    # The panel as it first opens; a few rows up and down where fonts differ.
+    for rows in (0, -1, 1, -2, 2, 3):
+        start = region.x + 175, region.y + region.height - 450 + 20 * rows
+        built = only().mu_unit.built
+        yield from drag(start, (start[0] + 24, start[1]), pause=1.2)
+        if abs(wall() - 0.9) > 1e-4:
+            break
+        if only().mu_unit.built != built:
+            key("Z", ctrl=True)  # another parameter
+            yield 3.0
+    yield from settled()
+    dragged = wall()
+    assert abs(dragged - 0.9) > 1e-4, "no slider was found"
+    gesture("both undone and done again")
+    yield from typed("Z", ctrl=True)
+    assert abs(wall() - 0.9) < 1e-6
+    yield from typed("Z", ctrl=True)
+    assert roots() == [], "adding a unit is more than one undo step"
+    for _ in range(2):
+        yield from typed("Z", ctrl=True, shift=True)
+    assert abs(wall() - dragged) < 1e-6
+    yield from settled()
+    assert list(only().children) == []
+    gesture("a step muted, and undone")
+    assert called(bpy.ops.mu.mute, step="cells") == {"FINISHED"}
+    yield 2.0
+    assert "cells" in stack.muted(only().mu_unit)
+    yield from typed("Z", ctrl=True)
+    assert stack.muted(only().mu_unit) == frozenset()
+    called(bpy.ops.mu.delete)
+    yield 1.0
 
 
 def on_a_unit():
@@ -535,6 +595,7 @@ def session():
         sys.setprofile(blocked)
     try:
         for part in (
+            by_mouse_and_keys,
             on_a_unit,
             in_other_scenes,
             in_files,

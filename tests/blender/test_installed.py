@@ -117,9 +117,7 @@ def test_an_upgrade_keeps_the_users_presets(installed, home, archive):
 
 
 @pytest.mark.skipif(not WINDOW, reason="NOT TESTED with mouse and keys: set MU_BLENDER_UI")
-@pytest.mark.parametrize(
-    "script", ["mouse_and_keys.py", "steps_by_mouse.py", "trees_by_mouse.py", "gestures_in_window.py"]
-)
+@pytest.mark.parametrize("script", ["trees_by_mouse.py", "gestures_in_window.py"])
 def test_mouse_and_keys(script, installed, home, tmp_path):
     os.environ["MU_TEST_FOLDER"] = str(tmp_path)
     call(home, HERE / script, tmp_path / "screen.png", 1800, command=WINDOW)
