@@ -13,7 +13,7 @@ from ..errors import MuError
 from ..measured import Experiment
 from ..measured.kinds import quantity_of
 from .simulator import Composite
-from .unclocked import Points, lone, points
+from .unclocked import IN_A_ROW, Points, in_a_run, lone, points
 
 Array = np.ndarray[Any, Any]
 
@@ -280,7 +280,9 @@ def unpredicted_readings(values: Array, predicted: Array, step: float = 0.0) -> 
     size = float(np.median(away)) / 0.6745
     size = max(size, max(quantum(values), step) / math.sqrt(12.0), 1e-9 * float(np.ptp(values[known])))
     alone = away > WRONG * size
-    alone[:2] = alone[-2:] = False
+    alone[:IN_A_ROW] = alone[-IN_A_ROW:] = False
+    # What lasts is the model's.
+    alone &= ~in_a_run(alone)
     fast = np.ptp(beside(np.pad(plain, 1, "edge"), 3), axis=1)
     for i in np.flatnonzero(alone & (away <= fast)):
         alike = fast >= ALIKE * fast[i]

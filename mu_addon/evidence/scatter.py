@@ -45,6 +45,8 @@ WINDOW, LOUD = 15, 2.5
 ALONE, MOST = 4.0, 0.2
 # Blocks over which separate loud ones are one burst, in which a reading may be near the others by chance.
 TOGETHER = 7
+# Noise of two records differs by twice its square; what is alike in both, by less than this share of it.
+ALIKE = 0.5
 # A louder block does not count any more.
 LOUDEST = 1e3
 
@@ -203,11 +205,13 @@ def with_bursts(record: Record, left: Array) -> tuple[Record, list[str]]:
     """The record with each block's noise if it varies in time or with load, and a text on where.
 
     By the scatter of a misfit (N,) from block to block, in windows, to which a smooth error of the model does
-    not contribute. Unchanged where the scatter is even.
+    not contribute. Unchanged where the scatter is even, or as loud in a repeat, which leaves the same.
     """
     found, words = [], []
     for s in record.series:
         louder = None if s.group == KNOWN or math.isnan(s.sample_s) else _loudness(s.time_s, left[s.at])
+        if louder is not None and _alike(record, s, left, louder > 1.0):
+            louder = None
         found.append(attrs.evolve(s, louder=louder))
         if louder is not None:
             at = s.time_s[int(np.argmax(louder))]
@@ -216,6 +220,17 @@ def with_bursts(record: Record, left: Array) -> tuple[Record, list[str]]:
                 f"{louder.max():.2g} times the usual, most at {at:.4g} s; readings there count for less"
             )
     return attrs.evolve(record, series=tuple(found)) if words else record, words
+
+
+def _alike(record: Record, series: Series, left: Array, loud: Array) -> bool:
+    """Return True if a repeat of a series leaves the same misfit (N,) in its loud blocks (b,) of a mask."""
+    own = left[series.at][loud]
+    others = [
+        left[o.at][loud]
+        for o in record.series
+        if o is not series and o.at.stop - o.at.start == len(loud) and repeats(record, series, o)
+    ]
+    return any(float(np.sum((own - other) ** 2)) < ALIKE * float(np.sum(own**2)) for other in others)
 
 
 def _loudness(time_s: Array, left: Array) -> Array | None:

@@ -101,7 +101,7 @@ def lone(every: Sequence[Points]) -> list[Array]:
         alone = np.abs(p.away) > WRONG * scale
         if not p.closed:
             alone[:IN_A_ROW] = alone[-IN_A_ROW:] = False
-        alone &= ~_in_a_run(alone, p.closed)
+        alone &= ~in_a_run(alone, p.closed)
         for i in np.flatnonzero(alone):
             alone[i] = not _likewise(p, int(i), every)
         few = np.count_nonzero(alone) <= max(1, round(MOST * len(alone)))
@@ -109,7 +109,7 @@ def lone(every: Sequence[Points]) -> list[Array]:
     return found
 
 
-def _in_a_run(alone: Array, closed: bool) -> Array:
+def in_a_run(alone: Array, closed: bool = False) -> Array:
     """Mask (n,) of points that are among more than `IN_A_ROW` in a row of a mask (n,)."""
     mode: Any = "wrap" if closed else "constant"
     runs = sliding_window_view(np.pad(alone, IN_A_ROW, mode), IN_A_ROW + 1).all(axis=1)
