@@ -24,6 +24,8 @@ BY_SHARE = (
     Parameter("width", "", 0.02, 5.0, 0.4, (0.3,), "of the largest strain: m of Dorfmann and Ogden 2004"),
     Parameter("shape", "", 0.2, 3.0, 1.0, (1.0,), "Weibull's, of the spread of chains that give way"),
 )
+# Samples that a turn between two of them needs.
+FEWEST = 5
 # Gauss-Legendre points on 0..1 for the energy: exact for laws up to degree 15.
 _AT, _WEIGHT = np.polynomial.legendre.leggauss(8)
 _AT, _WEIGHT = (_AT + 1) / 2, _WEIGHT / 2
@@ -62,15 +64,26 @@ def _by_peak(stress: Array, v: Values, at: Setting) -> Array:
 
 
 def _by_share(stress: Array, v: Values, at: Setting) -> Array:
-    below, most = _below(at)
+    return stress * _kept(*_below(at), v)
+
+
+def _unit_by_share(p: Array, v: Values, at: Setting) -> Array:
+    """Of a unit by its pressure over its modulus, as its strains nearly go with that."""
+    size = np.abs(p)
+    most = _largest(at.time_s.tobytes() if len(size) > FEWEST else b"", size.tobytes(), at.before_kPa)
+    return p / _kept(most - size, most, v)
+
+
+def _kept(below: Array, most: Array, v: Values) -> Array:
+    """Share (n,) of the virgin modulus left at an amount (n,) below the largest strain or pressure (n,)."""
     way = below / np.maximum(v["width"] * most, 1e-12)
-    return stress * (1 + v["lost"] * np.expm1(-(way ** v["shape"])))
+    return 1 + v["lost"] * np.expm1(-(way ** v["shape"]))
 
 
 def _below(at: Setting) -> tuple[Array, Array]:
     """Amount (n,) by which strains are below the largest so far in size, and that largest (n,)."""
     size = np.abs(at.path)
-    timed = at.time_s is not None and len(size) > 5
+    timed = at.time_s is not None and len(size) > FEWEST
     most = _largest(at.time_s.tobytes() if timed else b"", size.tobytes(), at.past.strain)
     return most - size, most
 
@@ -131,9 +144,9 @@ EFFECT = Declaration(
             refines=True,
         ),
         Law(
-            MACHINE,
+            (*CYCLED, *MACHINE),
             BY_SHARE,
-            {"stress_softening": _by_share},
+            {"softening": _unit_by_share, "stress_softening": _by_share},
             "loading softens all later loading below its largest strain, by a share that ends",
             refines=True,
         ),

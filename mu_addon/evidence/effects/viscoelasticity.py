@@ -11,6 +11,7 @@ from .declaration import (
     IN_MODEL,
     MACHINE,
     Array,
+    Data,
     Declaration,
     Law,
     Parameter,
@@ -55,6 +56,13 @@ FINDLEY = (
 )
 Elements = tuple[tuple[float, float], ...]
 """Share of the modulus, and time in s, of each part that relaxes."""
+
+
+def _begun(law: Law, data: Data) -> tuple[Law, ...]:
+    """The law, which begins before the longest record ends: later on it is a drift of anything."""
+    lasts = [float(np.ptp(e["time_s"])) for e in data.own if "time_s" in e.columns]
+    share, onset = law.parameters
+    return (attrs.evolve(law, parameters=(share, onset.narrowed(onset.low, max([onset.null, *lasts])))),)
 
 
 def _one(p: Array, v: Values, at: Setting) -> Array:
@@ -145,6 +153,7 @@ EFFECT = Declaration(
             BY_DECADES,
             {"relaxation": _decades, "stress_relaxation": _stress_decades, "elements": _elements},
             "all moduli relax with time, equally in each decade",
+            offered=_begun,
         ),
         Law(
             (*CYCLED, *MACHINE),
