@@ -125,13 +125,15 @@ def by_search(fit: Fit) -> float:
     return sum(2.0 * math.log(e.tried) for e in fit.effects)
 
 
-def refined(fitter: Fitter, fit: Fit, progress: Callable[[str], None] = lambda _: None) -> Fit:
+def refined(
+    fitter: Fitter, fit: Fit, progress: Callable[[str], None] = lambda _: None, laws: Sequence[Effect] = ()
+) -> Fit:
     """A fit with a law of more freedom for one of its effects where that fits better; else itself.
 
     Better by `RIVAL_DELTA_CHI2`: the mechanism is the same, and the data choose its law again with every
-    added effect.
+    added effect. laws: others that are tried as well.
     """
-    for law in fitter.simulator.refinements:
+    for law in (*laws, *fitter.simulator.refinements):
         for i, e in enumerate(fit.effects):
             if e.name != law.name or e.whose or e.keys == law.keys or set(e.kinds) != set(law.kinds):
                 continue

@@ -78,7 +78,8 @@ def held_back(fitter: Fitter, fit: Fit) -> Parameter | None:
         p = nuisances.get(key)
         if p is None or not math.isfinite(fit.chi2):
             continue
-        ends = [(p.low, -1.0), (p.high, 1.0)]
+        # At its null there is none of it: no bound of ours.
+        ends = [(end, out) for end, out in ((p.low, -1.0), (p.high, 1.0)) if end != p.null]
         beyond = [out for end, out in ends if math.isclose(fit.values[key], end, rel_tol=1e-4)]
         others = np.linalg.qr(np.delete(every, i, axis=1))[0]
         own = every[:, i] - others @ (others.T @ every[:, i])

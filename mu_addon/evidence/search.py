@@ -97,7 +97,10 @@ def select(
                 ps, levels = [p_best, p_best], [pool, [chosen]]
             elif not level:
                 doubted = f"{pool[0].names[-1]} fits, but its leave-one-out prediction fails"
-            break
+            other = _foretelling(fitter, effects, seen, chosen, pool, progress) if level else None
+            if other is None:
+                break
+            p, pool = other[0], [other[1], *pool]
         if level == 1 and not alone:
             alone = True
             others = by_all_laws(fitter, levels[0], progress, every=True)
@@ -125,6 +128,31 @@ def select(
         table_base = table
         doubted = too_far(fitter, base)
     return Selection(base, chosen, causes, singles, table_base, table, p_best, doubted)
+
+
+def _foretelling(
+    fitter: Fitter,
+    effects: Sequence[Effect],
+    seen: Sequence[Sensitivity],
+    less: Fit,
+    pool: Sequence[Fit],
+    progress: Callable[[str], None],
+) -> tuple[float, Fit] | None:
+    """Other effects than a pool's best, that do better than it by other laws and predict what was left out.
+
+    With the probability that noise gains as much; None without. A first effect's law was the best of it
+    alone, and beside a second one another may be right.
+    """
+    best: dict[tuple[str, ...], Fit] = {}
+    for f in pool:
+        best.setdefault(f.names, f)
+    for f in list(best.values())[1 : SEEDS + 1]:
+        other = refined(fitter, f, progress, effects)
+        if cost(other) < cost(pool[0]) and loss(fitter, less, other) > 0.0:
+            p = false_alarm_probability(less, seen, gain_of(fitter, less, other))
+            if p < FALSE_ALARM_RATE:
+                return p, other
+    return None
 
 
 def _hidden_pair(
