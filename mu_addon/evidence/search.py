@@ -24,6 +24,7 @@ from .hypotheses import (
     refined,
 )
 from .owned import owned_effects, owners
+from .plausibility import at_a_bound
 from .pooled import fits_among, pooled_effects, sizes_of
 from .residuals import dependence_table, strict_table, structure, taken_by_scales
 from .rivals import causes_of, pairs_for
@@ -72,7 +73,9 @@ def select(
             break
         if level:
             pool = hypotheses(fitter, levels[-1][:1], effects, progress)
-        if not pool or of_the_law(chosen, pool[0], taken):
+        # Of an effect that would have to be larger than it can be, more than its law is wrong.
+        least = 0.0 if at_a_bound(chosen) else taken
+        if not pool or of_the_law(chosen, pool[0], least):
             break
         p = false_alarm_probability(chosen, seen, gain_of(fitter, chosen, pool[0]))
         p_best = p if level == 0 else p_best
@@ -86,7 +89,7 @@ def select(
                 p_best, chosen = pair
                 ps, levels = [p_best, p_best], [pool, [chosen]]
             break
-        if p >= FALSE_ALARM_RATE or of_the_law(chosen, pool[0], taken):
+        if p >= FALSE_ALARM_RATE or of_the_law(chosen, pool[0], least):
             break
         if loss(fitter, chosen, pool[0]) <= 0.0:
             # It cannot be compared with earlier ones; its part is left as structure. A first one may need a
