@@ -77,7 +77,7 @@ def _unit_by_share(p: Array, v: Values, at: Setting) -> Array:
 def _kept(below: Array, most: Array, v: Values) -> Array:
     """Share (n,) of the virgin modulus left at an amount (n,) below the largest strain or pressure (n,)."""
     way = below / np.maximum(v["width"] * most, 1e-12)
-    return 1 + v["lost"] * np.expm1(-(way ** v["shape"]))
+    return np.asarray(1 + v["lost"] * np.expm1(-(way ** v["shape"])))
 
 
 def _below(at: Setting) -> tuple[Array, Array]:
