@@ -102,7 +102,9 @@ def _inputs(value: Any) -> Row:
     found: Row = {"scale": design.unit.scale, "path": design.path}
     found |= {f"{section}.{d.name}": v for section, d, v in stated(design.unit)}
     if isinstance(design, UnitStudy):
-        found |= {"times": design.times}
+        pressures = ", ".join(f"{p:g}" for p in design.samples.distinct_kPa)
+        found |= {"times": design.times, "pressures_kPa": pressures, "self_contact": design.self_contact}
+        found |= {"duration_s": float(design.samples.time_s[-1]), "self_friction": design.self_friction}
         found |= {f"mesh.{key}": v for key, v in attrs.asdict(design.mesh).items()}
         found |= {"effects": "; ".join(design.effects.words())}
     return found
