@@ -40,7 +40,7 @@ def prepare():
     from mu_addon.blender.gripper.state import GRASP
     from mu_addon.blender.simulate.job import SIMULATION
     from tests.blender.filming import ANGLES, film, pressures
-    from tests.usecases.diagnosis_data import weighed_blocks
+    from tests.studies.diagnosis_data import weighed_blocks
 
     weighed_blocks(FOLDER / "blocks", 0.09)
     truth = film(FOLDER / CLIP, ANGLES)[:, 0].tolist()

@@ -36,11 +36,11 @@ from mu_addon import design, studies
 from mu_addon.cli import main as command_line
 from mu_addon.design.parameters import load_preset, to_toml
 from mu_addon.design.surface import stl_bytes
-from mu_addon.usecases.simulate_and_place import light
+from mu_addon.simulate_and_place import light
 from tests.design.printing import parts
 from tests.run.test_mutated_files import CORPUS, INDEX, RECORDING, mutated
 from tests.run.test_reading import MODEL
-from tests.usecases.fault_injection import PLACEMENT, ran, results, started
+from tests.studies.fault_injection import PLACEMENT, ran, results, started
 
 ASSETS, DATA = ROOT / "assets", ROOT / "tests" / "data"
 COARSE = ["--refine", "0.35", "--times", "3", "--no-report"]

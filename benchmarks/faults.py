@@ -38,7 +38,7 @@ from mu_addon.studies.starting import begin_study
 from tests.headless.test_resume import JOB as COARSE
 from tests.run.failing_files import failing
 from tests.run.failing_memory import short_of_memory
-from tests.usecases.fault_injection import PARTIAL, PLACEMENT, inject_each, placement
+from tests.studies.fault_injection import PARTIAL, PLACEMENT, inject_each, placement
 
 JOBS = {
     False: COARSE,

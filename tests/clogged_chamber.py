@@ -18,7 +18,7 @@ from mu_addon.studies.starting import start
 
 from .evidence import analytic
 from .made_once import made_once
-from .usecases.diagnosis_data import bent_unit
+from .studies.diagnosis_data import bent_unit
 
 
 def responses(unit, experiments, settings, cache, progress, held):

@@ -11,7 +11,7 @@ from mu_addon.design.parameters import load_preset
 from mu_addon.run.cache import Cache
 from mu_addon.sensing.light_law import fit_law
 from mu_addon.sensing.optics import Optics
-from mu_addon.usecases.simulate_and_place import light
+from mu_addon.simulate_and_place import light
 
 from .made_once import made_once
 

@@ -18,6 +18,7 @@ from pathlib import Path
 from benchmarks.table import options_of, print_head, print_row
 from mu_addon.design.parameters import load_preset
 from mu_addon.design.settings import PRESET
+from mu_addon.diagnose.unknown import unknown_of
 from mu_addon.evidence.unit_fem import KNOWN, UnitSettings
 from mu_addon.measured import read_folder
 from mu_addon.meshing.settings import MeshSettings
@@ -25,7 +26,6 @@ from mu_addon.run.context import RunContext
 from mu_addon.run.progress import Progress
 from mu_addon.studies.diagnose import Diagnose
 from mu_addon.studies.starting import start
-from mu_addon.usecases.diagnose.unknown import unknown_of
 
 DATA = Path(__file__).parents[2] / "assets" / "examples" / "paper-bending"
 

@@ -32,8 +32,8 @@ def add(commands: Commands[Any]) -> None:
 def run(options: argparse.Namespace, context: RunContext) -> None:
     """Print the comparison, and write it into a folder if one is named."""
     from ..files import make_folder, write_text
+    from ..nodes.comparison import comparison_html, difference, of_runs, write_comparison
     from ..report.html_parts import number, page
-    from ..usecases.graph.comparison import comparison_html, difference, of_runs, write_comparison
 
     found = of_runs([Path(folder) for folder in options.runs])
     for name, status in found.unfinished:

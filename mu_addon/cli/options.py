@@ -11,8 +11,8 @@ if TYPE_CHECKING:
     from ..design.quantity import Description
     from ..run.context import RunContext
     from ..run.study import Input
-    from ..usecases.simulate_and_place.extended_unit import Extended
-    from ..usecases.simulate_and_place.named_effects import NamedEffects
+    from ..simulate_and_place.extended_unit import Extended
+    from ..simulate_and_place.named_effects import NamedEffects
 
 # What add_subparsers returns, and what takes an option: argparse gives them no public names.
 Commands = argparse._SubParsersAction
@@ -115,7 +115,7 @@ def add_model(command: Group) -> None:
 
 def add_orientation(command: Group) -> None:
     """--orientation, the direction of gravity."""
-    from ..usecases.simulate_and_place.settings import ORIENTATION
+    from ..simulate_and_place.settings import ORIENTATION
 
     command.add_argument(
         "--orientation", type=float, default=ORIENTATION.default, metavar="DEG", help=help_of(ORIENTATION)
@@ -201,12 +201,12 @@ def modelled(
     """
     import attrs
 
-    from ..usecases.simulate_and_place.named_effects import NamedEffects
+    from ..simulate_and_place.named_effects import NamedEffects
 
     unit, turn = unit_of(options), options.orientation if whole else 0.0
     effects = NamedEffects(orientation_deg=turn, where="--orientation")
     if options.model is not None:
-        from ..usecases.simulate_and_place.extended_unit import read_extended
+        from ..simulate_and_place.extended_unit import read_extended
 
         found = read_extended(unit, options.model)
         found = _report_applied(found if whole else found.of_parameters(), options, context)

@@ -18,7 +18,7 @@ KEPT = ("report", "workers", "device", "scheduler", "retry")
 
 def add(commands: Commands[Any]) -> None:
     """Add the parser of `resume`."""
-    from ..usecases.simulate_and_place.settings import WORKERS
+    from ..simulate_and_place.settings import WORKERS
 
     command = commands.add_parser(
         "resume",

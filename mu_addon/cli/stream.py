@@ -25,7 +25,7 @@ def add_ports(commands: Commands[Any]) -> None:
 
 def run_ports(options: argparse.Namespace, context: RunContext) -> None:
     """Put a line for each port into the summary."""
-    from ..usecases.sensor.stream import port_lines
+    from ..sensing.stream import port_lines
 
     context.summary["ports"] = port_lines()
     context.console_summary = lambda summary: summary["ports"] or ["no serial port was found"]
@@ -90,7 +90,7 @@ def run(options: argparse.Namespace, context: RunContext) -> None:
     """Stream until Ctrl-C."""
     from ..errors import InputError
     from ..sensing.settings import BAUD
-    from ..usecases.sensor.stream import serial_source, simulated_source, stream
+    from ..sensing.stream import serial_source, simulated_source, stream
 
     require_out(options)
     if options.seconds is not None and not 0 < options.seconds < math.inf:
@@ -117,7 +117,7 @@ def shown(options: argparse.Namespace) -> Sink | None:
     if options.quiet:
         return None
     from ..run.progress import json_lines
-    from ..usecases.sensor.stream import Display
+    from ..sensing.stream import Display
     from .closed_pipe import until_closed
 
     return until_closed(json_lines(sys.stdout) if options.json else Display(sys.stdout))
@@ -142,7 +142,7 @@ def add_replay(commands: Commands[Any]) -> None:
 def run_replay(options: argparse.Namespace, context: RunContext) -> None:
     """Play the recording to its end."""
     from ..sensing.sources import Replay
-    from ..usecases.sensor.stream import stream
+    from ..sensing.stream import stream
 
     require_out(options)
     stream(

@@ -63,7 +63,7 @@ def _add_plan(command: Any, one: Any) -> None:
 
 
 def _plan(options: argparse.Namespace, context: RunContext, one: Any, values: Any) -> Any:
-    from ..usecases.parameter_study.plan import read_plan
+    from ..studies.parameter_study.plan import read_plan
 
     return read_plan(Path(options.file)).continued(Path(options.out) / "sweep.toml", options.add)
 

@@ -1,6 +1,6 @@
 """Node trees: nodes, trees and their files, faults, and evaluation.
 
-This package is independent of units and simulations: `usecases.graph` defines the nodes.
+This package is independent of units and simulations: `nodes` defines the nodes.
 """
 
 from typing import TYPE_CHECKING

@@ -15,7 +15,7 @@
         def result(self, stiffness: float) -> Iterator[Part]: ...
 
 Command, inputs' file, node, plan, cache, resume, report and summary follow (`execution`, `cli.studies`,
-`report.study_report`, `usecases.graph.studies`). The parameters of a stage name what it needs: inputs, values
+`report.study_report`, `nodes.studies`). The parameters of a stage name what it needs: inputs, values
 derived from them, results of other stages. Nothing else can make its cached result stale. A declaration
 imports public faces of packages alone, which load when they are used.
 """

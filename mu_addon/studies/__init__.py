@@ -9,7 +9,16 @@ from pkgutil import iter_modules
 
 from ..run.study import Study
 
-_OF_ALL = ("inputs", "unit_inputs", "unit_motion", "unit_ranking", "starting")
+_OF_ALL = (
+    "inputs",
+    "parameter_study",
+    "unit_comparison",
+    "unit_runs",
+    "unit_inputs",
+    "unit_motion",
+    "unit_ranking",
+    "starting",
+)
 _OF_A_UNIT = {"design": "unit_ranking", "simulate": "unit_ranking", "place": "unit_ranking"}
 """Module of a study of several commands, by each."""
 _FOUND = (m.name.rstrip("_").replace("_", "-") for m in iter_modules(__path__) if m.name not in _OF_ALL)

@@ -31,8 +31,8 @@ from ..run.study import (
 from .inputs import FileInput, MeasuredInput, ModelInput, UnitInput, asked
 
 if TYPE_CHECKING:
-    from ..usecases.diagnose.judged_data import JudgedData, Judging
-    from ..usecases.diagnose.unknown import Shaped, Unknown
+    from ..diagnose.judged_data import JudgedData, Judging
+    from ..diagnose.unknown import Shaped, Unknown
 
 # Stages as `evidence.simulations_plan` names them.
 LATTICE, FREE, HELD, DESIGNS = "lattice", "unit", "unit with its tip held", "unit of every design"
@@ -63,7 +63,7 @@ class UnknownInput(FileInput):
 
     def made(self, values: tuple[Any, ...], given: Mapping[str, Any]) -> Unknown | None:
         """The parameters of a file; raises InputError."""
-        from ..usecases.diagnose.unknown import unknown_of
+        from ..diagnose.unknown import unknown_of
 
         return unknown_of(Path(values[0]), given["unit"] or design.load_preset(PRESET)) if values[0] else None
 
@@ -113,10 +113,10 @@ def _judging(study: Diagnose) -> float:
 
 
 def _shown(of: str, title: str) -> Any:
-    """A section of the parts that the function `of` of `usecases.diagnose.parts` gives."""
+    """A section of the parts that the function `of` of `diagnose.parts` gives."""
 
     def show(self: Any, found: JudgedData) -> Iterator[Part]:
-        from ..usecases.diagnose import parts
+        from ..diagnose import parts
 
         yield from getattr(parts, of)(found)
 
@@ -242,7 +242,7 @@ class Diagnose(Study):
         It includes instruments and effects in time, but no weight, walls or print: those need further
         simulations, which take most of a verdict's time.
         """
-        from ..usecases.diagnose.judged_data import first_look
+        from ..diagnose.judged_data import first_look
 
         return first_look(evidence.bending_freely(experiments), base[0], before, tell)
 
@@ -252,7 +252,7 @@ class Diagnose(Study):
         unknown: Unknown, tell: Tell,
     ) -> Shaped:  # fmt: skip
         """What the data say about unknown parameters without effects, and settings with every design."""
-        from ..usecases.diagnose.unknown import shaped
+        from ..diagnose.unknown import shaped
 
         return shaped(unknown, simulating, unit, evidence.bending_freely(experiments), tell)
 
@@ -280,7 +280,7 @@ class Diagnose(Study):
         lattice: Simulated | None = None, effects: Simulated | None = None, held: Simulated | None = None,
     ) -> Judging:  # fmt: skip
         """The verdict, of a unit by a first look at each effect."""
-        from ..usecases.diagnose.judged_data import judged_by
+        from ..diagnose.judged_data import judged_by
 
         return judged_by(experiments, before, lattice, (effects, held), tell)
 
@@ -291,7 +291,7 @@ class Diagnose(Study):
         lattice: Simulated | None = None, shaped: Shaped | None = None,
     ) -> Judging:  # fmt: skip
         """The verdict with every effect in question at all its sizes."""
-        from ..usecases.diagnose.judged_data import with_all_sizes
+        from ..diagnose.judged_data import with_all_sizes
 
         settings = shaped.settings if shaped else simulating
         return with_all_sizes(first, experiments, unit, settings, before, lattice, tell)
@@ -303,7 +303,7 @@ class Diagnose(Study):
         whole: Judging | None = None, shaped: Shaped | None = None,
     ) -> JudgedData:  # fmt: skip
         """The verdict with its model and the remarks on it."""
-        from ..usecases.diagnose.judged_data import judged_data
+        from ..diagnose.judged_data import judged_data
 
         return judged_data(experiments, remarked, unit, known, whole or first, shaped)
 
@@ -315,7 +315,7 @@ class Diagnose(Study):
 
     def subtitle(self) -> str:
         """The experiments, and how the unit was modelled."""
-        from ..usecases.diagnose.words import subtitle
+        from ..diagnose.words import subtitle
 
         return subtitle(self.data.experiments, self.self_contact)
 
@@ -333,8 +333,8 @@ class Diagnose(Study):
     @section()
     def answer(self, found: JudgedData) -> Iterator[Part]:
         """The verdict, and its files."""
-        from ..usecases.diagnose import parts
-        from ..usecases.diagnose.judged_data import residual_rows, summary
+        from ..diagnose import parts
+        from ..diagnose.judged_data import residual_rows, summary
 
         yield from parts.answer(found)
         yield from (recorded(key, value) for key, value in summary(found).items())

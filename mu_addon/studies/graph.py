@@ -29,7 +29,7 @@ class TreeInput(Input):
 
     def read(self, name: str, found: Found) -> NodeTree:
         """The tree of the file, with names of files relative to its folder; raises InputError."""
-        from ..usecases.graph.definitions import definitions
+        from ..nodes.definitions import definitions
 
         tree = tree_of_keys(found.table)
         found.keys.clear()
@@ -85,7 +85,7 @@ class Graph(Study):
 
     def require_sound(self) -> None:
         """Raise InputError for the first fault of a node to be evaluated."""
-        from ..usecases.graph.definitions import definitions
+        from ..nodes.definitions import definitions
 
         needed = self.tree.upstream(self.wanted or self.tree.nodes)
         found = [fault for fault in faults(self.tree, definitions()) if fault.node in needed]
@@ -96,6 +96,6 @@ class Graph(Study):
 
     def work(self, folder: Path, context: RunContext) -> Any:
         """Evaluate the tree; the work of its nodes is that of studies in folders of their own."""
-        from ..usecases.graph.run import evaluate
+        from ..nodes.run import evaluate
 
         return evaluate(self, folder, context)

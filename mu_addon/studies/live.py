@@ -6,9 +6,9 @@ from pathlib import Path
 
 import attrs
 
+from ..live_bending.requests import ASKED, BENT, CELLS, REQUEST
 from ..run.context import RunContext
 from ..run.study import Study
-from ..usecases.live_bending.requests import ASKED, BENT, CELLS, REQUEST
 
 
 @attrs.frozen(kw_only=True, eq=False)
@@ -29,6 +29,6 @@ class Live(Study):
 
     def work(self, folder: Path, context: RunContext) -> None:
         """Answer requests until the process ends."""
-        from ..usecases.live_bending.run import answer
+        from ..live_bending.run import answer
 
         answer(folder)

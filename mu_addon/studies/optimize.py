@@ -487,8 +487,8 @@ def mechanics_of(
     refine: of the mesh, by default the search's. Raises InputError where the unit cannot have the model.
     """
     from ..fem.unit_materials import materials_of
-    from ..usecases.simulate_and_place.extended_unit import extend
-    from ..usecases.simulate_and_place.named_effects import NamedEffects
+    from ..simulate_and_place.extended_unit import extend
+    from ..simulate_and_place.named_effects import NamedEffects
 
     settings = design.settings if refine is None else attrs.evolve(design.settings, refine=refine)
     first = None if model is None else extend(design.unit, model)

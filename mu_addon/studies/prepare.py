@@ -100,7 +100,7 @@ def _difference(job: Prepare, folder: Path) -> dict[str, Any]:
     import numpy as np
 
     from ..report.motion_files import REGIONS, read_motion
-    from ..usecases.simulate_and_place.run_difference import difference
+    from ..simulate_and_place.run_difference import difference
 
     name, one, other = job.of["name"], *(read_motion(Path(job.of[run])) for run in ("one", "other"))
     found = {r: difference(one, name, one.skin(r, job.of["cut"]), other, name) for r in REGIONS}

@@ -53,9 +53,9 @@ class Record(Study):
 
         Raises InputError, OutputError, and MuError where the recording was stopped early.
         """
+        from ..sensing import stream
         from ..sensing.reconnecting import Control
         from ..sensing.session import run_session
-        from ..usecases.sensor import stream
 
         place = next(p for k in range(1, 10**6) if not (p := folder / f"recording-{k}").exists())
         source = (

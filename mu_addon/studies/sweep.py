@@ -19,10 +19,10 @@ from ..errors import InputError
 from ..reading import parse_json, text_in
 from ..run.parts import Beside, Chart, Fact, Part, Sentence, Table, csv, echo, recorded
 from ..run.study import Dropped, Found, Input, Node, Over, Study, Written, given, section, stage
-from ..usecases import parameter_study
-from ..usecases.parameter_study.settings import ADD, WORKERS
-from ..usecases.simulate_and_place.settings import STAGES
+from ..simulate_and_place.settings import STAGES
+from . import parameter_study
 from .inputs import UNIT, SchedulerInput, once
+from .parameter_study.settings import ADD, WORKERS
 
 TABLE, PROTOCOL = "points.csv", "protocol.csv"
 LAST = ("seconds", "memory_MB", "worker", "what", "where", "what_to_do")
@@ -54,7 +54,7 @@ class PlanInput(Input):
 
     def read(self, name: str, found: Found) -> parameter_study.Plan:
         """The plan of the folder; raises InputError."""
-        from ..usecases.parameter_study.plan import counts_of, planned
+        from .parameter_study.plan import counts_of, planned
 
         folder, keys = found.path.parent, {"protocol": str(found.path.parent / PROTOCOL)} | found.keys
         table = found.table
@@ -182,7 +182,7 @@ class Sweep(Study):
     )
     def points(self, task: parameter_study.Task) -> parameter_study.Outcome:
         """The study of a point; one that breaks a rule has none."""
-        from ..usecases.parameter_study import point
+        from .parameter_study import point
 
         if task is None:
             raise Dropped
@@ -204,7 +204,7 @@ class Sweep(Study):
         return [self._row(number, points.get(number)) for number in range(1, self.plan.size + 1)]
 
     def _row(self, number: int, found: parameter_study.Outcome | None) -> Row:
-        from ..usecases.parameter_study.results import figures
+        from .parameter_study.results import figures
 
         inputs = self.plan.values[number - 1]
         if found is None:
@@ -266,8 +266,8 @@ class Sweep(Study):
         """Each figure against each input."""
         import numpy as np
 
-        from ..usecases.parameter_study.charts import effect_chart
-        from ..usecases.parameter_study.main_effects import main_effect
+        from .parameter_study.charts import effect_chart
+        from .parameter_study.main_effects import main_effect
 
         rows = self.rows(points)
         outputs = [name for name in self.shown(rows) if len(_with_number(rows, name)) >= FEWEST]
@@ -299,7 +299,7 @@ class Sweep(Study):
         import numpy as np
 
         from ..optimization.search import pareto
-        from ..usecases.parameter_study.charts import front_chart
+        from .parameter_study.charts import front_chart
 
         rows = self.rows(points)
         goals = [(n, 1.0) for n in self.plan.minimize] + [(n, -1.0) for n in self.plan.maximize]

@@ -9,14 +9,14 @@ from typing import Any
 import attrs
 
 from .. import design, fem, meshing
+from .. import simulate_and_place as core
 from ..design.quantity import described
 from ..design.settings import FRICTION
 from ..errors import InputError
 from ..meshing.settings import REFINE
 from ..run.study import Found, Input, Written
 from ..sensing.optics import Optics
-from ..usecases import simulate_and_place as core
-from ..usecases.simulate_and_place.settings import PROTOCOL
+from ..simulate_and_place.settings import PROTOCOL
 from .inputs import FileInput
 
 BODY, PROTOCOL_FILE, OBSTACLES = "body.obj", "protocol.csv", "obstacles.obj"

@@ -10,6 +10,7 @@ from typing import Any
 import attrs
 
 from .. import design, fem, meshing
+from .. import simulate_and_place as core
 from ..design.quantity import described
 from ..design.settings import QUALITY, USUAL_RESIN
 from ..errors import InputError
@@ -17,8 +18,7 @@ from ..fem.device import DEVICE, known_device
 from ..meshing.settings import SELF_CONTACT
 from ..run.parts import File, Part, Sentence, Warn, csv, recorded
 from ..run.study import Input, Members, Over, Study, Tell, given, intermediate, section, setting, stage
-from ..usecases import simulate_and_place as core
-from ..usecases.simulate_and_place.settings import SELF_FRICTION, TIMES, UNDER_PRESSURE, WORKERS
+from ..simulate_and_place.settings import SELF_FRICTION, TIMES, UNDER_PRESSURE, WORKERS
 from .inputs import OnceInput, UnitInput
 from .unit_inputs import BodyInput, EffectsInput, MeshInput, ObstaclesInput, ProtocolInput, grasp
 
@@ -42,7 +42,7 @@ def taking(title: str) -> Any:
     """Expected seconds of a stage of that title, of a study."""
 
     def seconds(study: Any) -> float:
-        from ..usecases.simulate_and_place.expected import seconds
+        from ..simulate_and_place.expected import seconds
 
         return seconds(study, title)
 
@@ -269,14 +269,14 @@ class UnitMotion(Study):
 
     def bytes_needed(self) -> int:
         """Room that a run takes on the disk at most."""
-        from ..usecases.simulate_and_place.expected import expected_bytes
+        from ..simulate_and_place.expected import expected_bytes
 
         return expected_bytes(self)
 
     @property
     def report_s(self) -> float:
         """Expected seconds of the report."""
-        from ..usecases.simulate_and_place.expected import UNSOLVED_REPORT_S, seconds_of
+        from ..simulate_and_place.expected import UNSOLVED_REPORT_S, seconds_of
 
         return seconds_of("report") if "simulate" in self.stages else UNSOLVED_REPORT_S
 

@@ -10,6 +10,7 @@ from typing import Any
 import attrs
 
 from .. import design, fem, meshing, placement
+from .. import simulate_and_place as core
 from ..placement.settings import BEND, LONGEST, SHORTEST
 from ..run.parts import Part, Sentence, Warn, recorded
 from ..run.study import (
@@ -27,16 +28,7 @@ from ..run.study import (
     stage,
 )
 from ..sensing.optics import Optics
-from ..usecases import simulate_and_place as core
-from ..usecases.simulate_and_place.settings import (
-    ALL_PATHS,
-    CHECKS,
-    MESH_CHECK,
-    PATHS,
-    QUICK,
-    QUICK_REFINE,
-    STATIONS,
-)
+from ..simulate_and_place.settings import ALL_PATHS, CHECKS, MESH_CHECK, PATHS, QUICK, QUICK_REFINE, STATIONS
 from .inputs import OnceInput
 from .unit_inputs import OpticsInput
 from .unit_motion import SOLVER, UnitMotion, state_message, state_sought, taking
@@ -259,7 +251,7 @@ class UnitStudy(UnitMotion):
 
     def detail(self) -> str:
         """What its stages' seconds depend on."""
-        from ..usecases.simulate_and_place.expected import Size
+        from ..simulate_and_place.expected import Size
 
         return str(Size.of(self)) if "simulate" in self.stages else self.stages[-1]
 

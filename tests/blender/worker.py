@@ -29,7 +29,7 @@ def renew(registered):
 KEPT = (
     ("mu_addon.blender.unit.stack", "STACK"),
     ("mu_addon.blender.node_tree.state", "_kept"),
-    ("mu_addon.usecases.graph.design_nodes", "STACK"),
+    ("mu_addon.nodes.design_nodes", "STACK"),
 )
 """What was computed, kept by its inputs as long as the process lives."""
 

@@ -3,6 +3,7 @@
 import attrs
 import numpy as np
 
+from mu_addon.diagnose.words import sentence, to_do
 from mu_addon.evidence.diagnosis import diagnose
 from mu_addon.evidence.effect import FORCE_SCALE, offered
 from mu_addon.evidence.effects.declaration import Data
@@ -20,7 +21,6 @@ from mu_addon.evidence.prediction.pressure_hold import ChamberPressure
 from mu_addon.evidence.record import record
 from mu_addon.evidence.rivals import causes_of, with_promising_rivals
 from mu_addon.evidence.simulator import Composite
-from mu_addon.usecases.diagnose.words import sentence, to_do
 from tests.evidence.bench import experiment
 
 T = np.linspace(0.0, 60.0, 100)

@@ -6,13 +6,13 @@ import attrs
 import numpy as np
 import pytest
 
+from mu_addon.diagnose.words import sentence
 from mu_addon.evidence.diagnosis import diagnose
 from mu_addon.evidence.effect import readable
 from mu_addon.evidence.instrument_curve import curved
 from mu_addon.evidence.prediction.unit_pressure import UnitPressure
 from mu_addon.evidence.sensitivity import best_seen
 from mu_addon.evidence.simulator import Composite
-from mu_addon.usecases.diagnose.words import sentence
 from tests.evidence import analytic, bench
 
 RANGE_kPa = 40.0

@@ -11,6 +11,7 @@ import pytest
 from benchmarks.evidence.second_code.judging import simulator_of
 from benchmarks.evidence.second_code.recording import write
 from benchmarks.evidence.second_code.sets import made, order
+from mu_addon.diagnose.words import sentence
 from mu_addon.evidence.chamber import ROOM_K, ATMOSPHERE_kPa
 from mu_addon.evidence.diagnosis import diagnose
 from mu_addon.evidence.effect import Parameter
@@ -20,7 +21,6 @@ from mu_addon.evidence.prediction.pressure_step import PressureStep
 from mu_addon.evidence.prediction.waveguide_bending import WaveguideVoltage
 from mu_addon.evidence.ringing import swinging
 from mu_addon.measured import read_folder
-from mu_addon.usecases.diagnose.words import sentence
 from tests.evidence import analytic, bench
 
 BATTERY, LATER = 7711, 251126

@@ -3,10 +3,10 @@
 import numpy as np
 import pytest
 
+from mu_addon.diagnose.words import sentence, to_do
 from mu_addon.evidence.diagnosis import diagnose
 from mu_addon.evidence.prediction.bench import bench_simulators
 from mu_addon.evidence.simulator import Composite
-from mu_addon.usecases.diagnose.words import sentence, to_do
 from tests.evidence.bench import experiment
 
 

@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 from scipy.integrate import trapezoid
 
+from mu_addon.diagnose.words import sentence, to_do
 from mu_addon.evidence.diagnosis import diagnose
 from mu_addon.evidence.effect import SLIP
 from mu_addon.evidence.effect import offered as laws
@@ -14,7 +15,6 @@ from mu_addon.evidence.effects.declaration import Data
 from mu_addon.evidence.effects.marker_slip import Recordings, searched
 from mu_addon.evidence.extended import extended_model
 from mu_addon.evidence.hypotheses import by_search
-from mu_addon.usecases.diagnose.words import sentence, to_do
 from tests.evidence import analytic, bench
 
 DT = 0.4

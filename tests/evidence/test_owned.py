@@ -4,12 +4,12 @@ import attrs
 import numpy as np
 import pytest
 
+from mu_addon.diagnose.words import sentence
 from mu_addon.evidence.effect import Effect, Parameter
 from mu_addon.evidence.extended import extended_model
 from mu_addon.evidence.owned import owned_effects
 from mu_addon.evidence.prediction.bench import bench_simulators
 from mu_addon.evidence.simulator import Composite
-from mu_addon.usecases.diagnose.words import sentence
 from tests.evidence.bench import experiment
 from tests.evidence.test_instruments import judged, noise
 

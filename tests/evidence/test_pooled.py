@@ -4,13 +4,13 @@ import attrs
 import numpy as np
 import pytest
 
+from mu_addon.diagnose.words import sentence
 from mu_addon.evidence.diagnosis import diagnose
 from mu_addon.evidence.extended import extended_model
 from mu_addon.evidence.pooled import pooled_effects, sizes_of, spread_of
 from mu_addon.evidence.prediction.bench import bench_simulators
 from mu_addon.evidence.prediction.unit_pressure import UnitPressure
 from mu_addon.evidence.simulator import Composite
-from mu_addon.usecases.diagnose.words import sentence
 from tests.evidence import analytic
 from tests.evidence.test_instruments import judged
 from tests.evidence.test_owned import chambers, strips

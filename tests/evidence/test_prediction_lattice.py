@@ -10,6 +10,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from benchmarks.offset_fit import fit_offset
+from mu_addon.diagnose.words import advice, sentence
 from mu_addon.errors import InputError
 from mu_addon.evidence.diagnosis import diagnose
 from mu_addon.evidence.prediction.bench import bench_simulators
@@ -17,7 +18,6 @@ from mu_addon.evidence.prediction.lattice_compression import ComputedCell, Latti
 from mu_addon.evidence.simulator import Composite
 from mu_addon.homogenize.offset_response import OffsetResponse
 from mu_addon.measured import read_folder
-from mu_addon.usecases.diagnose.words import advice, sentence
 
 from .bench import experiment
 

@@ -8,6 +8,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from mu_addon.diagnose.words import sentence
 from mu_addon.errors import InputError
 from mu_addon.evidence.diagnosis import diagnose
 from mu_addon.evidence.drive import reading_noise
@@ -26,7 +27,6 @@ from mu_addon.evidence.readings import (
 )
 from mu_addon.evidence.record import record
 from mu_addon.evidence.simulator import Composite
-from mu_addon.usecases.diagnose.words import sentence
 from tests.evidence import bench
 
 

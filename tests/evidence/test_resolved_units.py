@@ -64,7 +64,7 @@ def test_a_run_with_walls_that_touch_is_another():
 
 
 @pytest.mark.nightly(
-    "tests/usecases/test_simulate_and_place.py::test_a_study_says_where_walls_and_struts_touch"
+    "tests/studies/test_simulate_and_place.py::test_a_study_says_where_walls_and_struts_touch"
 )
 def test_walls_that_touch_hold_the_unit_back():
     crossing, touching = crossing_and_touching()

@@ -3,13 +3,13 @@
 import numpy as np
 import pytest
 
+from mu_addon.diagnose.words import advice, sentence, to_do
 from mu_addon.evidence.diagnosis import diagnose
 from mu_addon.evidence.drive import denoised_drives
 from mu_addon.evidence.found_causes import RIVAL_DELTA_CHI2, not_distinguished
 from mu_addon.evidence.prediction import coupon
 from mu_addon.evidence.prediction.bench import bench_simulators
 from mu_addon.evidence.simulator import Composite
-from mu_addon.usecases.diagnose.words import advice, sentence, to_do
 from tests.evidence import analytic
 from tests.evidence.bench import acted, experiment
 from tests.evidence.test_coinciding import titles

@@ -9,9 +9,9 @@ from mu_addon.errors import MuError
 from mu_addon.files import write_text
 from mu_addon.graph import Definition, Evaluation, Input, Order, Output, Setting
 from mu_addon.graph.records import read_records, record_of, write_records
+from mu_addon.nodes.runs import FolderRuns, Stopped
 from mu_addon.run.cache import Cache
 from mu_addon.run.study import Node, Study, setting
-from mu_addon.usecases.graph.runs import FolderRuns, Stopped
 
 from .toys import DEFINITIONS, node, tree
 

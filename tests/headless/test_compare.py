@@ -2,7 +2,7 @@
 
 import csv
 
-from tests.usecases.bent_motion import ANGLES, write_bent_run
+from tests.studies.bent_motion import ANGLES, write_bent_run
 
 from .processes import assert_clear_failure, here
 

@@ -9,7 +9,7 @@ from mu_addon.design.shapes import box
 from mu_addon.design.solid import printable
 from mu_addon.design.surface import stl_bytes
 from tests.golden.commands import recording
-from tests.usecases.diagnosis_data import weighed_blocks
+from tests.studies.diagnosis_data import weighed_blocks
 
 from .processes import ROOT, assert_clear_failure, here
 

@@ -10,9 +10,9 @@ import pytest
 from mu_addon.design.parameters import load_preset, read_unit, to_toml
 from mu_addon.fem.protocol import read_protocol
 from mu_addon.meshing.settings import MeshSettings
+from mu_addon.simulate_and_place.settings import STAGES
 from mu_addon.studies.starting import write_study
 from mu_addon.studies.unit_ranking import UnitStudy
-from mu_addon.usecases.simulate_and_place.settings import STAGES
 
 from .processes import assert_clear_failure, command, here, run
 

@@ -10,8 +10,8 @@ import pytest
 import trimesh
 
 from mu_addon.graph import Node, NodeTree, Source, tree_text
-from mu_addon.usecases.graph.definitions import definitions
-from mu_addon.usecases.graph.templates import template
+from mu_addon.nodes.definitions import definitions
+from mu_addon.nodes.templates import template
 
 from .processes import ROOT, assert_clear_failure, command, here, is_running, worker_of
 

@@ -14,7 +14,7 @@ import numpy as np
 import pytest
 
 from mu_addon.design.anchors import anchor_points
-from mu_addon.usecases.simulate_and_place.settings import STAGES
+from mu_addon.simulate_and_place.settings import STAGES
 
 from ..report.browser import EXECUTABLE, Browser, complaints, requests
 from .processes import PATIENCE_S, ROOT, RUN, UNIT, coarse, command, here, run, worker_of
@@ -187,7 +187,7 @@ def test_the_whole_lattice_is_searched_for_the_best_path(searched):
     assert all(low - 1e-6 <= float(p["length_mm"]) <= high + 1e-6 for p in paths)
 
 
-@pytest.mark.nightly("tests/usecases/test_motion.py::test_a_path_off_the_mirror_plane_moves_both_sides_apart")
+@pytest.mark.nightly("tests/studies/test_motion.py::test_a_path_off_the_mirror_plane_moves_both_sides_apart")
 def test_a_window_of_anchors_is_one_of_the_lattices_paths(searched):
     """The same path by two ways: the half mesh for windows, the whole one for the lattice's."""
     folder, _ = searched

@@ -105,7 +105,7 @@ EFFECT = """
 import json
 import numpy as np
 from mu_addon.evidence.diagnosis import diagnose
-from mu_addon.usecases.diagnose.words import to_do
+from mu_addon.diagnose.words import to_do
 from tests.evidence import analytic
 
 random, made = np.random.default_rng(4), []
@@ -173,5 +173,5 @@ def test_a_study_is_one_file(copy):
     assert "ring" in ran(copy, "headless/run.py", "--help")
     shutil.rmtree(copy / "ring" / "cache")
     assert "The ring has 1.24 mN/mm." in ran(copy, "headless/run.py", "resume", "ring")
-    nodes = "from mu_addon.usecases.graph.definitions import definitions as made"
+    nodes = "from mu_addon.nodes.definitions import definitions as made"
     assert ran(copy, "-c", f"{nodes}; print(made()['ring'].settings[0].name)") == "radius_mm\n"

@@ -28,7 +28,7 @@ UNLIMITED = {
     "mu_addon/sensing/framing.py": "a frame, see its limit",
     "mu_addon/sensing/text_lines.py": "a line, see its limit",
     "mu_addon/sensing/recording.py": "a line of a file read within its limit",
-    "mu_addon/usecases/sensor/watch.py": "a status read within the limit of a text",
+    "mu_addon/sensing/watch.py": "a status read within the limit of a text",
 }
 READING = {
     "read_text",

@@ -17,11 +17,11 @@ from mu_addon.design.quantity import Description
 from mu_addon.fem import device
 from mu_addon.grasp import settings as grip
 from mu_addon.meshing import settings as mesh
+from mu_addon.nodes.definitions import definitions
 from mu_addon.optimization import settings as search
 from mu_addon.placement import settings as path
-from mu_addon.usecases.graph.definitions import definitions
-from mu_addon.usecases.parameter_study import settings as sweep
-from mu_addon.usecases.simulate_and_place import settings as study
+from mu_addon.simulate_and_place import settings as study
+from mu_addon.studies.parameter_study import settings as sweep
 
 ROOT = Path(mu_addon.__file__).parent
 # Modules with settings.
@@ -45,8 +45,8 @@ OTHERWISE = {
     "placement/search.py": {"batch"},  # of paths
     "sensing/calibration.py": {"dark"},  # subtracted already
     "studies/unit_motion.py": {"self_contact"},  # of a call, which may be quick
-    "usecases/parameter_study/point.py": {"memory_MB", "seconds"},  # that a study took
-    "usecases/graph/studies.py": {"protocol"},
+    "studies/parameter_study/point.py": {"memory_MB", "seconds"},  # that a study took
+    "nodes/studies.py": {"protocol"},
 }
 
 

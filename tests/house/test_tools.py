@@ -26,7 +26,7 @@ def tool(name):
 @pytest.mark.parametrize(
     ("module", "line", "contract"),
     [
-        ("design", "from ..usecases import report", "imports run downward"),
+        ("design", "from ..studies import report", "imports run downward"),
         ("novelty", "", "imports run downward"),
         ("blender/shared", "from ..unit import object", "a room of the extension imports only rooms below"),
         ("blender/novelty", "", "a room of the extension imports only rooms below"),
@@ -35,11 +35,11 @@ def tool(name):
 def test_the_import_contracts_can_fail(tmp_path, module, line, contract):
     shutil.copy(ROOT / "pyproject.toml", tmp_path)
     rooms = "blender", "blender/shared", "blender/unit"
-    for name in ("", "design", "fem", "placement", "usecases", *rooms, module):
+    for name in ("", "design", "fem", "placement", "studies", *rooms, module):
         folder = tmp_path / "mu_addon" / name
         folder.mkdir(parents=True, exist_ok=True)
         (folder / "__init__.py").write_text("")
-    for name in ("errors.py", "files.py", "usecases/report.py", "blender/unit/object.py"):
+    for name in ("errors.py", "files.py", "studies/report.py", "blender/unit/object.py"):
         (tmp_path / "mu_addon" / name).write_text("")
     (tmp_path / "mu_addon" / module / "new.py").write_text(line + "\n")
     status, output = run(tool("lint-imports"), "--no-cache", cwd=tmp_path)

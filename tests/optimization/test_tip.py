@@ -16,7 +16,7 @@ from mu_addon.optimization.gradient import gradients
 from mu_addon.optimization.quantities import Angle, TipForce, TipPosition, Workspace
 from mu_addon.optimization.structure import solve
 from mu_addon.optimization.unit_body import Mechanics, UnitBody
-from mu_addon.usecases.simulate_and_place.named_effects import NamedEffects
+from mu_addon.simulate_and_place.named_effects import NamedEffects
 
 UNIT = load_preset("mu-1.0x").evolve(count=3)
 COARSE = MeshSettings(refine=0.2)

@@ -12,8 +12,8 @@ from mu_addon.report.results import Path, SideView
 from mu_addon.report.study_report import page_of
 from mu_addon.run.context import RunContext
 from mu_addon.run.progress import Progress
+from mu_addon.simulate_and_place.ranking import Ranking
 from mu_addon.studies.unit_ranking import UnitStudy
-from mu_addon.usecases.simulate_and_place.ranking import Ranking
 
 STUDY = UnitStudy(unit=load_preset("mu-1.0x"), times=41, stations=60)
 PATHS = tuple(Path(w.name, w.start, w.length) for w in STUDY.windows)

@@ -8,7 +8,7 @@ import pytest
 
 from mu_addon.report import heatmaps, plots
 from mu_addon.report.results import Path
-from mu_addon.usecases.simulate_and_place.shown_ranking import result_of
+from mu_addon.simulate_and_place.shown_ranking import result_of
 
 from .report_data import ANGLE, PATHS, PRESSURE, SECONDS, TIME, VIEW, ranking
 

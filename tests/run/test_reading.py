@@ -43,7 +43,7 @@ from mu_addon.sensing.calibration import read_calibration
 from mu_addon.sensing.recording import read_recording
 from mu_addon.studies.chain import Chain
 from mu_addon.studies.inputs import path_of
-from mu_addon.usecases.parameter_study.plan import read_plan
+from mu_addon.studies.parameter_study.plan import read_plan
 
 from ..lab_files.exports import BLUEHILL
 

@@ -17,7 +17,7 @@ from mu_addon.sensing.decoder import Decoder
 from mu_addon.sensing.framing import info_frame, sample_frame
 from mu_addon.sensing.recording import Recorder, read_recording
 from mu_addon.sensing.samples import Samples
-from mu_addon.usecases.sensor.stream import require_samples
+from mu_addon.sensing.stream import require_samples
 
 INFO = info_frame({"channels": ["light", "dark"], "unit": "V", "unit_per_count": 0.001})
 

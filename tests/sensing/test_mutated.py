@@ -18,7 +18,7 @@ from mu_addon.sensing.framing import framed, info_frame, sample_frame
 from mu_addon.sensing.recording import REJECTS, read_recording
 from mu_addon.sensing.samples import Samples
 from mu_addon.sensing.session import run_session
-from mu_addon.usecases.sensor.stream import Display, console_summary, status_line
+from mu_addon.sensing.stream import Display, console_summary, status_line
 
 from .mutations import FORMATS, NASTY, decoded, sound
 from .test_session import _Scripted

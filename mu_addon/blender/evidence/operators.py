@@ -57,7 +57,7 @@ def _evidence_apply_trouble(root):
 def evidence_apply(operator, root):
     """Apply the named effects to the unit and its next simulation; undo removes them"""
     # Imported late: it needs the simulator's packages, which a Blender may lack.
-    from ...usecases.simulate_and_place.extended_unit import read_extended
+    from ...simulate_and_place.extended_unit import read_extended
 
     found = evidence.diagnosis(root)
     extended = read_extended(to_unit(root.mu_unit), found.folder / evidence.MODEL)

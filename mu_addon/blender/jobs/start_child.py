@@ -43,7 +43,7 @@ WRITERS = (
     "mu_addon.evidence.unit_body",
     "mu_addon.fem.newton_settings",
     "mu_addon.placement.graph",
-    "mu_addon.usecases.simulate_and_place.named_effects",
+    "mu_addon.simulate_and_place.named_effects",
     "mu_addon.studies.unit_ranking",
     "mu_addon.studies.grip",
     "mu_addon.studies.live",

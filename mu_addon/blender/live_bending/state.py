@@ -188,7 +188,7 @@ def _changed(root: Any) -> None:
 
 def _recall(root: Any, live: Live) -> None:
     """Show a shape that was found before: the unit's own or, where none is shown, that of one like it."""
-    from ...usecases.live_bending.known import nearest
+    from ...live_bending.known import nearest
 
     unit = to_unit(root.mu_unit)
     if root.mu_unit.envelope or effects.inputs(root) or obstacles.inputs(root) or unit.wall.has_memory:
@@ -285,9 +285,9 @@ def _follow(root: Any, live: Live) -> None:
 
 def _ask(root: Any, live: Live) -> None:
     # Imported late, with the solver's packages.
+    from ...live_bending import requests
     from ...studies.live import Live
     from ...studies.starting import write_study
-    from ...usecases.live_bending import requests
 
     study = simulation.job_of(root)
     if live.child is None:
@@ -303,7 +303,7 @@ def _ask(root: Any, live: Live) -> None:
 
 def _answered(root: Any, live: Live) -> bool:
     """Read the process's latest answer and show it; return True if it is new."""
-    from ...usecases.live_bending.requests import BENT
+    from ...live_bending.requests import BENT
 
     path = live.folder / BENT
     try:

@@ -10,8 +10,8 @@ from bpy.props import BoolProperty, PointerProperty, StringProperty
 
 from ...graph.definition import FOLDER, Definition, Setting
 from ...graph.evaluation import BLOCKED, CACHED, COMPUTED, FAILED, MADE, MUTED, WAITING
+from ...nodes.definitions import definitions
 from ...run.progress import spell
-from ...usecases.graph.definitions import definitions
 from ..shared.blender_property import blender_property, path_property
 from ..shared.panels import wrapped
 from ..shared.updates import Signal

@@ -12,7 +12,7 @@ from ...design.parameters import to_toml
 from ...errors import InputError
 from ...graph.definition import Setting
 from ...graph.tree import Node, NodeTree, Source
-from ...usecases.graph.definitions import definitions
+from ...nodes.definitions import definitions
 from ..shared import updates
 from ..shared.blender_property import exact
 from ..unit.properties import to_unit

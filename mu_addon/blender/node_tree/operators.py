@@ -11,8 +11,8 @@ from ...errors import InputError
 from ...files import write_text
 from ...graph.tree import with_absolute_paths
 from ...graph.tree_file import read_tree, tree_text
-from ...usecases.graph import templates
-from ...usecases.graph.definitions import definitions
+from ...nodes import templates
+from ...nodes.definitions import definitions
 from ..jobs import start_child
 from ..jobs.operators import job_operators
 from ..shared.blender_property import listed

@@ -5,7 +5,7 @@ from __future__ import annotations
 import bpy
 
 from ...graph.evaluation import MADE
-from ...usecases.graph.definitions import definitions
+from ...nodes.definitions import definitions
 from ..jobs.panel import draw_job, open_buttons, whole
 from ..shared.panels import wrapped
 from ..shared.registration import menu

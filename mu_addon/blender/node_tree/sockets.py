@@ -9,7 +9,7 @@ from typing import Any
 import bpy
 
 from ...graph.definition import NUMBER
-from ...usecases.graph.definitions import definitions
+from ...nodes.definitions import definitions
 
 # A type that is not listed gets a colour by its name.
 _COLOURS = {

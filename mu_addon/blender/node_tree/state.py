@@ -21,11 +21,11 @@ from ...graph.records import FOLDER, read_records
 from ...graph.records import NAME as RECORDS
 from ...graph.tree import Source
 from ...graph.tree_file import file_name
+from ...nodes.definitions import definitions
+from ...nodes.plan import plan_of
+from ...nodes.templates import steps_of
 from ...studies.graph import Graph
 from ...studies.starting import write_study
-from ...usecases.graph.definitions import definitions
-from ...usecases.graph.plan import plan_of
-from ...usecases.graph.templates import steps_of
 from ..jobs.start_child import INTERVAL_S, JOB_ENDED, JobKind
 from ..shared import landing, viewports
 from ..shared.file_cache import FileCache

@@ -7,7 +7,7 @@ from typing import ClassVar
 import bpy
 
 from ...report.motion_files import FOLDER, MODEL_A
-from ...usecases.simulate_and_place.charts import ANGLE, delta_name
+from ...simulate_and_place.charts import ANGLE, delta_name
 from ..jobs.panel import open_buttons
 from ..shared.file_cache import icon_of
 from ..shared.panels import alert, plain_row, wrapped

@@ -9,7 +9,7 @@ from ...errors import MuError
 from ...fem.embedding import Embedding
 from ...report.motion_files import FOLDER, MODEL_A, REGIONS, Motion, read_motion
 from ...run.cache import key
-from ...usecases.simulate_and_place.run_difference import difference
+from ...simulate_and_place.run_difference import difference
 from ..jobs import prepared
 from ..shared.file_cache import FileCache
 from ..simulate import study_folder as studies

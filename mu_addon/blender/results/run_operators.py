@@ -5,7 +5,7 @@
 from bpy.props import StringProperty
 
 from ...errors import InputError
-from ...usecases.simulate_and_place import unit_runs
+from ...studies import unit_runs
 from ..shared import updates
 from ..shared.operators import operator, unless
 from ..simulate import study_folder as studies

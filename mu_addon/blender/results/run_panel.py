@@ -10,7 +10,7 @@ from typing import ClassVar
 import bpy
 
 from ...run.progress import spell
-from ...usecases.simulate_and_place.comparison import compare
+from ...studies.unit_comparison import compare
 from ..shared.panels import wrapped
 from ..shared.wording import path_symbol, sentence
 from ..simulate import study_folder as studies

@@ -6,7 +6,7 @@ import bpy
 from bpy.props import BoolProperty, CollectionProperty, IntProperty, StringProperty
 
 from ...errors import MuError
-from ...usecases.simulate_and_place import unit_runs
+from ...studies import unit_runs
 from ..jobs.start_child import JOB_ENDED
 from ..shared import viewports
 from ..shared.registration import connected, handler, property_of, timer

@@ -12,7 +12,7 @@ from typing import Any
 import bpy
 
 from ...errors import MuError
-from ...usecases.simulate_and_place import unit_runs
+from ...studies import unit_runs
 from ..gripper import object as gripper_object
 from ..gripper import state as grasps
 from ..shared import displays

@@ -1,6 +1,6 @@
 """The sensor's last seconds, drawn over the viewport: its angle with the 95 % band, and its channels.
 
-Every column of pixels shows the extremes of its samples, see `usecases.sensor.traces`; the cost of drawing
+Every column of pixels shows the extremes of its samples, see `sensing.traces`; the cost of drawing
 does not grow with the sensor's rate. It is drawn with the viewport and is not part of a render.
 """
 
@@ -16,7 +16,7 @@ from bpy_extras.view3d_utils import location_3d_to_region_2d
 from gpu_extras.batch import batch_for_shader
 from mathutils import Vector
 
-from ...usecases.sensor.traces import steady_range, unbroken
+from ...sensing.traces import steady_range, unbroken
 from ..results import legend
 from ..results.legend import TEXT, ticks, write
 from ..shared.registration import overlay

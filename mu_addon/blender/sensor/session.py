@@ -11,8 +11,8 @@ import numpy as np
 from ...errors import InputError
 from ...run.child import RUNNING, Child
 from ...sensing.recording import FIXED
-from ...usecases.sensor.traces import Traces
-from ...usecases.sensor.watch import Watched
+from ...sensing.traces import Traces
+from ...sensing.watch import Watched
 
 BINS = 600
 """Number of time steps across the plot."""

@@ -18,8 +18,8 @@ from ...errors import InputError, MuError
 from ...run.child import DONE, FAILED, RUNNING
 from ...run.folder import write_run
 from ...sensing.session import BACK
+from ...sensing.watch import Watched
 from ...studies.calibrate import Calibrate
-from ...usecases.sensor.watch import Watched
 from ..jobs import start_child
 from ..jobs.start_child import JobKind
 from ..shared import viewports

@@ -14,7 +14,7 @@ import numpy as np
 
 from ...errors import InputError
 from ...report.motion_files import Motion
-from ...usecases.simulate_and_place.poses import Poses, poses
+from ...simulate_and_place.poses import Poses, poses
 from ..preview import materials
 from ..results import bodies
 from ..results import motion as motion_parts

@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 from mathutils import Vector
 
-from ..shared import scene_units
+from . import scene_units
 
 GAP_MM = 10.0
 """Distance kept to other objects."""

@@ -15,7 +15,7 @@ from ..shared.blender_property import exact
 from ..shared.wording import readable
 
 if TYPE_CHECKING:
-    from ...usecases.simulate_and_place.named_effects import NamedEffects
+    from ...simulate_and_place.named_effects import NamedEffects
 
 WEIGHT = "gravity"
 """The effect that depends on the direction of gravity."""
@@ -71,7 +71,7 @@ def _direction(root: Any) -> float:
 
 def named_effects(root: Any) -> NamedEffects:
     """The effects as inputs of the simulation; raises InputError."""
-    from ...usecases.simulate_and_place.named_effects import NamedEffects
+    from ...simulate_and_place.named_effects import NamedEffects
 
     found = inputs(root)
     return NamedEffects(found.get("effects", {}), found.get("orientation_deg", 0.0), "effects of the unit")

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 import bpy
 
 from ...errors import InputError
-from ...usecases.simulate_and_place.settings import QUICK_REFINE
+from ...simulate_and_place.settings import QUICK_REFINE
 from ..jobs.start_child import JobKind
 from ..obstacles import state as obstacles
 from ..shared.blender_property import exact
@@ -33,7 +33,7 @@ def announced(root: Any, quick: bool = False) -> tuple[float, bool]:
 
 def _expected(root: Any, quick: bool) -> tuple[list[tuple[str, float]], bool]:
     """The plan, and True if all its long stages were measured: for this unit, else another one."""
-    from ...usecases.simulate_and_place.expected import (
+    from ...simulate_and_place.expected import (
         PATHS_CHECKED,
         SHIPPED_KPA,
         SOLVED,

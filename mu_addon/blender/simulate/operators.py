@@ -4,8 +4,8 @@
 
 import attrs
 
-from ...usecases.simulate_and_place import unit_runs
-from ...usecases.simulate_and_place.settings import QUICK
+from ...simulate_and_place.settings import QUICK
+from ...studies import unit_runs
 from ..jobs import start_child
 from ..jobs.operators import FILES, job_operators
 from ..shared.blender_property import blender_property

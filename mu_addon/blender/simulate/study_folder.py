@@ -13,8 +13,8 @@ import numpy as np
 
 from ...errors import MuError
 from ...meshing.settings import REFINE
-from ...usecases.simulate_and_place import unit_runs
-from ...usecases.simulate_and_place.unit_runs import Run
+from ...studies import unit_runs
+from ...studies.unit_runs import Run
 from ..obstacles import state as obstacles
 from ..shared.compat import user_folder
 from ..shared.file_cache import FileCache

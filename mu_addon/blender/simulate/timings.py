@@ -11,14 +11,14 @@ from ...errors import MuError
 from ...files import write_text
 from ...reading import file_bytes, parse_json
 from ...run.child import DONE
-from ...usecases.simulate_and_place import unit_runs
+from ...studies import unit_runs
 from ..jobs import start_child
 from ..shared.compat import user_folder
 from ..shared.file_cache import UNREADABLE, FileCache
 from ..shared.registration import at_end, connected
 
 if TYPE_CHECKING:
-    from ...usecases.simulate_and_place.expected import Size
+    from ...simulate_and_place.expected import Size
 
 LEAST_SHARE = 0.05
 """A stage that took less than this share of its earlier time was cached, and is not a measurement."""
@@ -33,7 +33,7 @@ def of_size(size: Size) -> str:
 
 def of_run(run: unit_runs.Run) -> str:
     """Detail of a run's seconds, as `of_size`."""
-    from ...usecases.simulate_and_place.expected import SHIPPED_KPA, Size
+    from ...simulate_and_place.expected import SHIPPED_KPA, Size
 
     contact = bool(run.tables.get("simulate", {}).get("self_contact"))
     pressures = tuple(p for p in SHIPPED_KPA if p > 0 or not run.left_out)

@@ -23,7 +23,7 @@ from ...design.parameters import SECTIONS, Unit
 from ...design.quantity import Description, describe
 from ...fem.device import DEVICE
 from ...meshing.settings import REFINE, SELF_CONTACT
-from ...usecases.simulate_and_place.settings import ALL_PATHS, ORIENTATION, PATHS, PROTOCOL, SELF_FRICTION
+from ...simulate_and_place.settings import ALL_PATHS, ORIENTATION, PATHS, PROTOCOL, SELF_FRICTION
 from ..shared.blender_property import BESIDE_BLEND_FILE, blender_property, exact, path_property
 from ..shared.registration import property_of
 from ..shared.updates import Signal

@@ -17,9 +17,9 @@ from mu_addon.meshing.settings import MeshSettings
 from mu_addon.studies.unit_ranking import UnitStudy
 
 from ...made_once import made_once
-from ...usecases.bent_motion import write_bent_run
-from ...usecases.diagnosis_data import weighed_blocks
-from ...usecases.made_up import place
+from ...studies.bent_motion import write_bent_run
+from ...studies.diagnosis_data import weighed_blocks
+from ...studies.made_up import place
 from ..filming import ANGLES, film, pressures
 from ..session import Blender, needs_bpy
 

@@ -24,7 +24,7 @@ from mu_addon.blender.unit import object as unit_object
 from mu_addon.blender.unit import preview_update as live
 from mu_addon.blender.unit.properties import to_unit
 from mu_addon.design.anchors import anchor_points
-from mu_addon.usecases.simulate_and_place.charts import ANGLE, angle_picture, delta_name, delta_picture
+from mu_addon.simulate_and_place.charts import ANGLE, angle_picture, delta_name, delta_picture
 
 from .acting import add, refused
 from .drawing import drawn, panels_of

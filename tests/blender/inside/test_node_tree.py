@@ -21,10 +21,10 @@ from mu_addon.blender.unit import object as unit_object
 from mu_addon.design.steps import STEPS
 from mu_addon.graph import read_tree
 from mu_addon.graph.tree_file import STATES
+from mu_addon.nodes import plan
+from mu_addon.nodes.definitions import definitions
+from mu_addon.nodes.templates import template, template_names
 from mu_addon.run.child import DONE
-from mu_addon.usecases.graph import plan
-from mu_addon.usecases.graph.definitions import definitions
-from mu_addon.usecases.graph.templates import template, template_names
 
 from .acting import add, refused
 from .drawing import drawn

@@ -371,7 +371,7 @@ def test_vents_for_the_direction_of_the_build():
 
 
 @pytest.mark.nightly(
-    "tests/usecases/test_check_print.py::test_a_file_is_repaired_where_there_is_one_way_to_and_the_report_says_how"
+    "tests/studies/test_check_print.py::test_a_file_is_repaired_where_there_is_one_way_to_and_the_report_says_how"
 )
 def test_a_file_is_checked_and_repaired_before(tmp_path):
     """As `check --stl FILE --repair`: a cube with one face turned over."""

@@ -31,7 +31,7 @@ from mu_addon.blender.sensor.session import Guide
 from mu_addon.blender.unit import object as unit_object
 from mu_addon.sensing.calibration import CalibrationSweep, calibrate, write_calibration
 from mu_addon.sensing.recording import read_recording
-from tests.usecases.bent_motion import write_bent_motion
+from tests.studies.bent_motion import write_bent_motion
 
 from .acting import add, refused
 from .drawing import drawn as drawn_by

@@ -8,8 +8,8 @@ import bpy
 from mu_addon.blender.shared.panels import wrapped
 from mu_addon.blender.shared.wording import in_panel
 from mu_addon.blender.sidebar import menus
+from mu_addon.diagnose.words import what_to_do
 from mu_addon.evidence.effects import DECLARED
-from mu_addon.usecases.diagnose.words import what_to_do
 
 from .drawing import panels_of
 

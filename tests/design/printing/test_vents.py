@@ -96,7 +96,7 @@ def test_a_wall_that_is_too_thin_or_too_thick_is_refused(printer, floor, words):
 
 
 @pytest.mark.nightly(
-    "tests/usecases/test_export.py::test_vents_for_a_build_direction_are_cut_and_their_plugs_written"
+    "tests/studies/test_export.py::test_vents_for_a_build_direction_are_cut_and_their_plugs_written"
 )
 def test_the_units_tip_takes_the_vent_and_its_membrane_none(printer):
     """With the inlet away from the platform the whole chamber is a cup, which begins at the tip's cap."""

@@ -1,0 +1,111 @@
+"""Nodes of jobs on a unit: simulation, ranking of paths, the lattice's law, print, gripper."""
+
+from __future__ import annotations
+
+from ..design.body import read_body
+from ..design.gripper import Fingers, Gripper, Plate
+from ..design.quantity import describe
+from ..design.rigid_body import RigidBody
+from ..design.settings import FRICTION
+from ..errors import InputError
+from ..graph.definition import FILE, Call, Definition, Input, Output, Outputs, Setting, setting
+from .late import of_orders
+from .parts import refuse_body
+from .studies import UNIT, node_of
+
+SIMULATE, PLACE, PRINT, GRASP = "Simulate", "Sensor", "Print", "Gripper"
+
+
+def _gripper(call: Call) -> Outputs:
+    s, design = call.settings, call.inputs["unit"]
+    refuse_body(design, "a gripper")
+    fingers = Fingers(**{d.name: s[d.name] for d in describe(Fingers)})
+    plate = Plate(**{d.name: s[d.name] for d in describe(Plate)})
+    return {"gripper": Gripper(design.unit, path=design.path or s["path"], fingers=fingers, plate=plate)}
+
+
+def _obstacle(call: Call) -> Outputs:
+    s = call.settings
+    if not s["file"]:
+        raise InputError("no body is named", "file", "give a file of a closed surface: STL, OBJ or PLY")
+    return {"obstacle": RigidBody(read_body(s["file"]), s["friction"])}
+
+
+FIGURES = (
+    "angle at the highest pressure",
+    "angle at the lowest pressure",
+    "range of angles",
+    "volume of resin",
+    "least deviation",
+)
+_TAKES_STUDY = Input("study", ("study",), "link a node Simulate or Rank Paths")
+
+
+def study_nodes() -> tuple[Definition, ...]:
+    """Definitions of the nodes of simulation, sensor, print and gripper."""
+    return (
+        node_of("simulate"),
+        Definition(
+            "obstacle",
+            "Obstacle",
+            SIMULATE,
+            "a rigid body that the unit may touch, fixed in the unit's frame",
+            outputs=(Output("obstacle", "obstacle", "the body"),),
+            settings=(
+                setting("file", "", "closed surface in mm: STL, OBJ or PLY", path=FILE),
+                Setting(FRICTION),
+            ),
+            make=_obstacle,
+            remark=lambda outputs: outputs["obstacle"].name,
+        ),
+        node_of("place"),
+        Definition(
+            "sensitivity",
+            "Sensitivity",
+            PLACE,
+            "the map of how much stiffness anywhere disturbs the motion, and its largest value in mm",
+            (_TAKES_STUDY,),
+            (Output("field", "field", "sensitivity.vtu"), Output("largest", "number", "largest, in mm")),
+            make=of_orders("sensitivity_of"),
+            remark=lambda outputs: f"up to {outputs['largest']:.3g} mm",
+        ),
+        Definition(
+            "light",
+            "Light",
+            PLACE,
+            "the signal of a waveguide along every path, and the largest per degree of bending",
+            (_TAKES_STUDY,),
+            (Output("signals", "file", "signals.csv"), Output("largest", "number", "largest, per degree")),
+            make=of_orders("light_of"),
+            remark=lambda outputs: f"{outputs['path']}: {outputs['largest']:.3g} per degree",
+        ),
+        Definition(
+            "figure",
+            "Figure of a Study",
+            SIMULATE,
+            "one number of a study",
+            (_TAKES_STUDY,),
+            (Output("number", "number", "the number"),),
+            (setting("figure", FIGURES[0], "which number", choices=FIGURES),),
+            make=of_orders("figure_of"),
+            remark=lambda outputs: f"{outputs['number']:.6g}",
+        ),
+        node_of("homogenize"),
+        node_of("check"),
+        node_of("export"),
+        Definition(
+            "gripper",
+            "Gripper",
+            GRASP,
+            "two equal units on a plate",
+            (UNIT,),
+            (Output("gripper", "gripper", "the gripper"),),
+            (
+                setting("path", "alpha4", "path of the waveguides if the unit has none"),
+                *map(Setting, (*describe(Fingers), *describe(Plate))),
+            ),
+            make=_gripper,
+            remark=lambda outputs: "{:.4g} x {:.4g} mm".format(*outputs["gripper"].size_mm),
+        ),
+        node_of("grip"),
+    )

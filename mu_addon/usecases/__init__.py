@@ -1,1 +1,0 @@
-"""Use cases: one folder a job, with its inputs, its stages, its report and its charts."""
