@@ -42,16 +42,16 @@ SPREAD = (
     Parameter("decades", "", 0.0, 8.0, 0.0, (2.0,), "over which they spread"),
 )
 CREEP = (
-    Parameter("creep_per_MPa", "1/MPa", 0.0, 0.5, 0.0, (3e-3,), "the volume's growth a decade of time"),
+    Parameter("creep_per_MPa", "1/MPa", 0.0, 2.0, 0.0, (3e-3,), "the volume's growth a decade of time"),
     Parameter("onset_s", "s", 0.1, 100.0, 1.0, (1.0, 10.0), "when that growth begins"),
 )
 GROWTH = (
-    Parameter("growth_per_MPa", "1/MPa", 0.0, 0.5, 0.0, (3e-3,), "the volume's, as the logarithm of time"),
+    Parameter("growth_per_MPa", "1/MPa", 0.0, 2.0, 0.0, (3e-3,), "the volume's, as the logarithm of time"),
     Parameter("begins_s", "s", 0.5, 1e4, 30.0, (5.0, 50.0), "began before the valve was shut"),
 )
 FINDLEY = (
     # From a small size alone fits of a large one end in another minimum, as bad as a wrong law.
-    Parameter("findley_per_MPa", "1/MPa", 0.0, 0.5, 0.0, (3e-3, 0.1), "the volume's growth in 100 s"),
+    Parameter("findley_per_MPa", "1/MPa", 0.0, 2.0, 0.0, (3e-3, 0.1), "the volume's growth in 100 s"),
     Parameter("findley_power", "", 0.05, 0.8, 0.3, (0.3,), "plastics 0.1 to 0.5 (Findley 1944)"),
 )
 Elements = tuple[tuple[float, float], ...]
