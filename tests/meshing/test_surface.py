@@ -15,9 +15,9 @@ from hypothesis.extra.numpy import arrays
 
 from mu_addon.errors import InputError, MeshingError
 from mu_addon.meshing import LATTICE, MEMBRANE, VOID, Surface, mesh_surface
-from mu_addon.meshing.mesh import boundary_faces
+from mu_addon.meshing.mesh import Mesh, boundary_faces, oriented
 from mu_addon.meshing.quality import cavity_enclosed, element_volumes
-from mu_addon.meshing.surface import winding_number
+from mu_addon.meshing.surface import _fullness, winding_number
 
 
 def sphere(radius: float, subdivisions: int = 2) -> trimesh.Trimesh:
@@ -109,6 +109,14 @@ def test_a_flat_element_is_bad_luck_and_meshed_again(tmp_path: Path, off: float)
     assert element_volumes(mesh).min() > 1e-3
     again = mesh_surface(ball.vertices, ball.faces, 4.0, cache=tmp_path)
     np.testing.assert_array_equal(again.nodes, mesh.nodes)
+
+
+@pytest.mark.parametrize("edge", [0.5, 20.0])
+def test_a_regular_element_is_full_at_any_size(edge: float) -> None:
+    nodes = edge * np.array([[1, 1, 1], [-1, 1, -1], [1, -1, -1], [-1, -1, 1]]) / np.sqrt(8)
+    none = np.zeros((0, 3))
+    mesh = Mesh(nodes, oriented(nodes, np.array([[0, 1, 2, 3]])), [LATTICE], none, [], [])
+    assert _fullness(mesh) == pytest.approx(1.0)
 
 
 def test_nothing_is_left_behind(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
