@@ -44,7 +44,7 @@ def main() -> None:
             words = ["place", *given, "--out", str(Path(home, "out")), "--no-report", "--quiet"]
             words += ["--refine", options.refine, "--workers", options.workers]
             runs = [placed([*words, *more], Path(home, "out")) for more in (["--quick"], [], ["--all-paths"])]
-        name = Path(unit).stem
+        name = Path(unit.removesuffix(".toml")).name
         print_paths(name, *(rows for rows, *_ in runs), runs[1][1])
         seconds[name] = [spent for *_, spent in runs]
     print()

@@ -14,7 +14,7 @@ from mu_addon.fem.trajectory import Trajectory
 from mu_addon.fem.unit_materials import materials_of
 from mu_addon.meshing.settings import MeshSettings
 from mu_addon.report.motion_files import write_model_a
-from mu_addon.simulate_and_place import unit_runs
+from mu_addon.studies import unit_runs
 from mu_addon.studies.starting import write_study
 from mu_addon.studies.unit_ranking import UnitStudy
 

@@ -15,9 +15,9 @@ from mu_addon.placement.candidates import Evaluation
 from mu_addon.placement.deviation import deviation_of
 from mu_addon.placement.elimination import Contest
 from mu_addon.run.parts import Sentence
-from mu_addon.simulate_and_place import unit_runs
 from mu_addon.simulate_and_place.motion_checks import doubts_of_protocol
 from mu_addon.simulate_and_place.ranking import Ranking
+from mu_addon.studies import unit_runs
 from mu_addon.studies.starting import write_study
 from mu_addon.studies.unit_comparison import compare
 from mu_addon.studies.unit_ranking import UnitStudy

@@ -10,7 +10,7 @@ from mu_addon.design.parameters import load_preset
 from mu_addon.errors import InputError
 from mu_addon.meshing.settings import MeshSettings
 from mu_addon.run.lock import FolderLock, InUseError
-from mu_addon.simulate_and_place import unit_runs
+from mu_addon.studies import unit_runs
 from mu_addon.studies.starting import write_study
 from mu_addon.studies.unit_comparison import compare
 from mu_addon.studies.unit_ranking import UnitStudy
