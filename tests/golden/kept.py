@@ -101,8 +101,9 @@ def headings(text):
 
 
 def said(text):
-    """Lines of the terminal, without progress and times."""
-    return [DURATION.sub("(time)", x.rstrip()) for x in text.splitlines() if not NOT_SAID.search(x)]
+    """Lines of the terminal, without progress and times, whatever width they have in a column."""
+    told = (DURATION.sub("(time)", x.rstrip()) for x in text.splitlines() if not NOT_SAID.search(x))
+    return [re.sub(r" +\(time\)", " (time)", x) for x in told]
 
 
 def leaves_of(path, timed):
