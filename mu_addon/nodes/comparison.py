@@ -20,7 +20,7 @@ from ..reading import is_number
 from ..report.html_parts import figure, number, table
 from ..report.plots import BY_LENGTH, BY_START, QUIET, canvas
 from ..run.summary import SUMMARY, read_summary
-from ..studies.parameter_study.results import figures
+from ..studies.parameter_study.results import angles_of, figures
 from ..studies.starting import kind_of
 from ..studies.unit_ranking import UnitStudy
 from .parts import Design
@@ -160,8 +160,8 @@ def _side_by_side(rows: Sequence[Row]) -> dict[str, tuple[Any, ...]]:
 
 
 def _angles(summary: Mapping[str, Any]) -> tuple[np.ndarray[Any, Any], np.ndarray[Any, Any]]:
-    found = sorted((float(p), float(a)) for p, a in (summary.get("angle_deg") or {}).items())
-    return np.array([p for p, _ in found]), np.array([a for _, a in found])
+    found = angles_of(summary)
+    return np.array([*found]), np.array([*found.values()])
 
 
 def difference(first: Any, value: Any) -> Any:

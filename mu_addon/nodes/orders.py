@@ -5,6 +5,7 @@ from __future__ import annotations
 from ..errors import InputError
 from ..graph.definition import Call, Outputs
 from ..graph.evaluation import Finished, Order
+from ..studies.parameter_study.results import angles_of
 from ..studies.unit_ranking import UnitStudy
 from .parts import solid_of
 
@@ -36,7 +37,7 @@ def light_of(call: Call) -> Outputs:
 def figure_of(call: Call) -> Outputs:
     """One number of a study."""
     summary, what = call.inputs["study"].summary, call.settings["figure"]
-    angles = {float(p): a for p, a in (summary.get("angle_deg") or {}).items()}
+    angles = angles_of(summary)
     volume = ((summary.get("gates") or {}).get("unit.stl") or {}).get("volume_mm3")
     by_path = summary.get("J_hat_mm")
     found = {

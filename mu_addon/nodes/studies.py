@@ -223,7 +223,7 @@ def node_of(name: str) -> Definition:
         tuple(dict.fromkeys(sockets)),
         tuple(Output(*one) for one in node.outputs),
         (*(s for one in asked.values() for s in _settings(one)), *node.settings),
-        order=lambda call: _order(kind, name, call),
+        order=lambda call: _order(kind, node, name, call),
         read=read,
         muting=node.passes[1] or MUTED,
         mute=passed if node.passes[0] else None,
@@ -251,9 +251,7 @@ def _settings(one: Asked) -> tuple[Setting, ...]:
     return tuple(Setting(d, one.path) for d in (*one.descriptions, *getattr(one, "settings", ())))
 
 
-def _order(kind: type[Study], name: str, call: Call) -> Order:
-    node = kind.node_of(name)
-    assert node is not None
+def _order(kind: type[Study], node: Node, name: str, call: Call) -> Order:
     if node.no_body:
         refuse_body(call.inputs["unit"], node.no_body)
     values: dict[str, Any] = {}

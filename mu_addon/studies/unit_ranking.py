@@ -30,6 +30,7 @@ from ..run.study import (
 from ..sensing.optics import Optics
 from ..simulate_and_place.settings import ALL_PATHS, CHECKS, MESH_CHECK, PATHS, QUICK, QUICK_REFINE, STATIONS
 from .inputs import OnceInput
+from .parameter_study.results import angles_of
 from .unit_inputs import OpticsInput
 from .unit_motion import SOLVER, UnitMotion, state_message, state_sought, taking
 
@@ -114,9 +115,8 @@ def _best_in_time(study: UnitStudy, first_ranking: core.Ranking) -> Growth:
 
 
 def _remark(summary: Mapping[str, Any]) -> str:
-    angles = {float(p): a for p, a in (summary.get("angle_deg") or {}).items()}
-    words = [f"{angles[p]:.1f}° at {p:g} kPa" for p in (max(angles),)] if angles else []
-    return ", ".join([*filter(None, [summary.get("chosen")]), *words])
+    highest = [f"{angle:.1f}° at {p:g} kPa" for p, angle in [*angles_of(summary).items()][-1:]]
+    return ", ".join([*filter(None, [summary.get("chosen")]), *highest])
 
 
 def _solves(wanted: Callable[[UnitStudy], bool], **growing: Any) -> Any:

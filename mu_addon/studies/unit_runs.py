@@ -31,6 +31,7 @@ from ..run.folder import ALWAYS, OWN
 from ..run.lock import LOCK, FolderLock, holder
 from ..simulate_and_place.settings import STAGES, left_out
 from ..toml_writer import toml_text
+from .parameter_study.results import angles_of
 
 if TYPE_CHECKING:
     from .unit_ranking import UnitStudy
@@ -151,8 +152,7 @@ class Run:
     @property
     def angles(self) -> list[tuple[float, float]]:
         """Pairs (pressure in kPa, bending angle in degrees) by pressure."""
-        found = self.summary.get("angle_deg") or {}
-        return sorted((float(p), float(a)) for p, a in found.items())
+        return [*angles_of(self.summary).items()]
 
     @property
     def ranking(self) -> list[tuple[str, float]]:

@@ -8,6 +8,11 @@ from typing import Any
 Row = dict[str, Any]
 
 
+def angles_of(summary: Mapping[str, Any]) -> dict[float, float]:
+    """Bending angles in degrees that a run's summary has, by pressure in kPa, ascending."""
+    return dict(sorted((float(p), float(a)) for p, a in (summary.get("angle_deg") or {}).items()))
+
+
 def figures(summary: Mapping[str, Any], density_g_per_ml: float) -> Row:
     """Figures of a study's finished stages; angle_deg has a column for every pressure."""
     found: Row = {}
@@ -19,11 +24,10 @@ def figures(summary: Mapping[str, Any], density_g_per_ml: float) -> Row:
     for name in ("cavity_volume_mm3", "nodes"):
         if name in mesh:
             found[name] = mesh[name]
-    angles = {float(p): a for p, a in (summary.get("angle_deg") or {}).items()}
-    if angles:
+    if angles := angles_of(summary):
         found["angle_lowest_deg"], found["angle_highest_deg"] = min(angles.values()), max(angles.values())
         found["angle_range_deg"] = max(angles.values()) - min(angles.values())
-        found |= {f"angle_deg at {p:g} kPa": angles[p] for p in sorted(angles) if p}
+        found |= {f"angle_deg at {p:g} kPa": a for p, a in angles.items() if p}
         crossed = summary.get("walls_cross_at_kPa") or {}
         found["walls_cross_at_kPa"] = " ".join(sorted(crossed, key=float))
     if best := summary.get("chosen"):
