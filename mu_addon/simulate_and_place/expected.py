@@ -14,25 +14,21 @@ if TYPE_CHECKING:
     from ..studies.unit_motion import UnitMotion
     from ..studies.unit_ranking import UnitStudy
 
-BEST = "solid with the best path"
-"""Stage of the printable unit with the path that a ranking chose."""
-PATHS_MOTION = "motion of the paths"
-"""Stage of the displacements, stresses and stretches of units with a sensor, for display."""
-FULL_S = {
-    "solid": 1.5, "mesh": 5.0, "Model A": 195.0, "candidates": 1400.0, "mesh check": 200.0, "map": 8.0,
-    PATHS_MOTION: 25.0,
-    "light": 7.0, BEST: 2.5, "ranking of the lattice's paths": 30.0, "check of the best paths": 1450.0,
-    "motion of the best path": 60.0, "report": 14.0,
+SECONDS = {
+    "solid": 1.5, "mesh": 5.0, "light": 7.0, "solid with the best path": 2.5,
+    "ranking of the lattice's paths": 30.0, "motion of the best path": 60.0,
 }  # fmt: skip
-"""Seconds on two cores, on the default mesh under the shipped protocol."""
-UNSOLVED_REPORT_S = 7.0
-"""Seconds of a report on a unit that was not simulated."""
-LEAST_S = {"Model A": 1.0, "candidates": 1.5, "mesh check": 3.5, "map": 0.3}
-"""Seconds of a stage that are independent of the mesh, for stages that depend on it."""
-SOLVED = ("Model A", "candidates", "mesh check", "check of the best paths", PATHS_MOTION)
-TOUCHING = 3.0
-"""Factor on the seconds of a state at -20 kPa where walls touch, by the square of the pressure: those under
-pressure are solved beside it."""
+"""Seconds of a stage on two cores."""
+ON_MESH = {
+    "Model A": (190.0, 1.0), "candidates": (1400.0, 1.5), "mesh check": (200.0, 3.5), "map": (8.0, 0.3),
+    "motion of the paths": (25.0, 0.0), "check of the best paths": (1450.0, 0.0),
+}  # fmt: skip
+"""Seconds of a stage on the default mesh under the shipped protocol, and those that no mesh shortens."""
+TOUCHING = {"Model A": 13.0, "candidates": 3.0}
+"""Work of a state at -20 kPa where walls touch, in units of one under pressure; it grows as the square of the
+pressure. Candidates start from Model A's states."""
+CROSSING = {"Model A": 30.0, "candidates": 1.0}
+"""The same without self-contact, where walls pass through each other and parts of the unit snap."""
 LEFT_UNDER_PRESSURE = 0.55
 """Share left out of the states after the highest pressure, of paths that are not the best, without suction:
 15 of 27 of `mu-1.0x`."""
@@ -66,16 +62,6 @@ def expected_bytes(job: UnitMotion) -> int:
     return BYTES[job.quality] + expected_nodes(job) * per_node * len(job.samples.distinct_kPa)
 
 
-def stage_names(place: bool, mesh_check: bool, graph: bool, simulate: bool = True) -> list[str]:
-    """Names of a study's stages."""
-    names = ["solid", *(["mesh", "Model A"] if simulate else [])]
-    if place:
-        names += ["candidates", *(["mesh check"] if mesh_check else []), PATHS_MOTION, "map", "light"]
-        names += [n for n in FULL_S if "path" in n and n not in (BEST, PATHS_MOTION)] if graph else []
-        names.append(BEST)
-    return [*names, "report"]
-
-
 @attrs.frozen
 class Size:
     """What a study's seconds depend on: chambers, refinement, self-contact, pressures (s,) in kPa, paths.
@@ -101,29 +87,32 @@ class Size:
     def factor(self, stage: str) -> float:
         """Work of a stage by that of the shipped protocol on the default mesh of six chambers, in contact."""
         shipped = Size(6, 1.0, True)
-        states = max(work(self, self.pressures_kPa), 1.0) / work(shipped, SHIPPED_KPA)
         body = of_mesh(self.refine) * self.chambers / 6
+        if stage == "Model A":
+            return body * _side_by_side(self) / _side_by_side(shipped)
+        whole = work(shipped, SHIPPED_KPA)
+        states = max(work(self, self.pressures_kPa), 1.0) / whole
         if stage != "candidates":
             return body * states
         paths = (self.chambers - 1) * (self.chambers - 2) / 2
         _, rest = first_and_rest(np.array(self.pressures_kPa))
-        later = work(self, [self.pressures_kPa[n] for n in rest]) / work(shipped, SHIPPED_KPA)
+        later = work(self, [self.pressures_kPa[n] for n in rest]) / whole
         left = later * max(paths - self.known, 0) if self.known else 0.0
         if min(self.pressures_kPa) >= 0.0:
             left *= LEFT_UNDER_PRESSURE
         return body * (states * paths - left) / 10
 
 
-def work(job: Size, pressures_kPa: Iterable[float]) -> float:
+def work(job: Size, pressures_kPa: Iterable[float], stage: str = "candidates") -> float:
     """Work of the states at these pressures, in units of one under pressure; none at 0 kPa."""
-    touches = job.self_contact
-    return sum(max(TOUCHING * (p / 20.0) ** 2, 1.0) if touches and p < 0 else 1.0 for p in pressures_kPa if p)
+    most = (TOUCHING if job.self_contact else CROSSING)[stage]
+    return sum(max(most * (p / 20.0) ** 2, 1.0) if p < 0 else 1.0 for p in pressures_kPa if p)
 
 
-def seconds_of(name: str, factor: float = 1.0) -> float:
-    """Seconds of a stage on two cores. factor: work by that of the shipped protocol on the default mesh."""
-    seconds = FULL_S[BEST if name.startswith("solid with ") else name]
-    return max(LEAST_S.get(name, 0.0), seconds * (factor if name in LEAST_S or name in SOLVED else 1.0))
+def _side_by_side(job: Size) -> float:
+    """Work of Model A's states on two cores: suction beside pressure."""
+    sides = ([p for p in job.pressures_kPa if (p < 0) == suction] for suction in (True, False))
+    return max(1.0, *(work(job, side, "Model A") for side in sides))
 
 
 def of_mesh(refine: float) -> float:
@@ -131,6 +120,9 @@ def of_mesh(refine: float) -> float:
     return float(refine ** (BY_WALL if refine < 1.0 else BY_REFINEMENT))
 
 
-def seconds(job: UnitStudy, name: str) -> float:
-    """Expected seconds of a study's stage on two cores."""
-    return seconds_of(name, Size.of(job).factor(name) if "simulate" in job.stages else 1.0)
+def seconds(job: UnitStudy, title: str) -> float:
+    """Expected seconds on two cores of a study's stage of that title."""
+    if title not in ON_MESH:
+        return SECONDS[title]
+    whole, least = ON_MESH[title]
+    return max(least, whole * Size.of(job).factor(title))

@@ -6,7 +6,7 @@ import pytest
 from mu_addon.cli.main import main
 from mu_addon.design.parameters import Unit, load_preset, to_toml
 from mu_addon.run import progress
-from mu_addon.simulate_and_place.expected import TOUCHING, Size, work
+from mu_addon.simulate_and_place.expected import CROSSING, TOUCHING, Size, work
 from mu_addon.studies.unit_ranking import UnitStudy
 
 STUDY = ["--no-self-contact", "--refine", "0.35", "--times", "3"]
@@ -49,29 +49,34 @@ def test_a_command_does_what_it_planned(monkeypatch, tmp_path, words):
     assert all(seconds is not None for seconds in left)
 
 
-@pytest.mark.parametrize(("apart", "suction"), [(False, 1.0), (True, TOUCHING)])
+@pytest.mark.parametrize(("apart", "suction"), [(False, 1.0), (True, TOUCHING["candidates"])])
 def test_suction_takes_longest_where_walls_touch(apart, suction):
     job = UnitStudy(unit=Unit(), self_contact=apart)
     size = Size.of(job)
     assert [work(size, [p]) for p in (-20.0, 0.0, 40.0)] == [suction, 0.0, 1.0]
     assert work(size, job.samples.distinct_kPa) == suction + max(suction / 4.0, 1.0) + 4
+    # Model A's two branches are solved side by side; suction is the longer one.
+    most = (TOUCHING if apart else CROSSING)["Model A"]
+    assert size.factor("Model A") == most / TOUCHING["Model A"]
+    under_pressure = attrs.evolve(size, pressures_kPa=(10.0, 20.0, 30.0, 40.0))
+    assert under_pressure.factor("Model A") == 4.0 / (1.25 * TOUCHING["Model A"])
 
 
 def test_a_plan_follows_what_is_asked_for():
-    """Fewer chambers and paths, no contact, a coarser mesh, fewer pressures: each shortens it at once."""
+    """Fewer chambers and paths, a coarser mesh, fewer pressures: each shortens it at once."""
     base = Size(6, 1.0, True, known=3)
     assert Size(6, 1.0, True).factor("Model A") == pytest.approx(1.0)
     assert Size(6, 1.0, True).factor("candidates") == pytest.approx(1.0)
     for other in (
         Size(3, 1.0, True, known=3),
-        Size(6, 1.0, False, known=3),
         Size(6, 0.5, True, known=3),
         Size(6, 1.0, True, (10.0, 20.0), known=3),
     ):
         for stage in ("Model A", "candidates"):
             assert other.factor(stage) < 0.9 * base.factor(stage)
+    assert Size(6, 1.0, False, known=3).factor("candidates") < 0.9 * base.factor("candidates")
     # Three of ten paths are solved in suction, which is most of the work.
-    suction = TOUCHING + max(TOUCHING / 4.0, 1.0)
+    suction = TOUCHING["candidates"] + max(TOUCHING["candidates"] / 4.0, 1.0)
     left_out = 0.7 * suction / (suction + 4)
     assert base.factor("candidates") == pytest.approx(1.0 - left_out)
     job = UnitStudy(unit=Unit(), self_contact=True)

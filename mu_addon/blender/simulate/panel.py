@@ -52,9 +52,9 @@ class MU_PT_simulate(UnitPanel, bpy.types.Panel):
         child = SIMULATION.child(root)
         start_button(layout, child, "mu.simulate", "PLAY", root=root, text=start_words(root))
         if study.command == "place" and not SIMULATION.is_running(root):
-            words = timed("Quick Ranking", announced(root, quick=True))
+            words = start_words(root, "Quick Ranking", quick=True)
             layout.operator("mu.simulate", text=words, icon="PLAY").quick = True
-        if child is None and not announced(root)[1]:
+        if child is None and (announced(root) or (0.0, True))[1] is False:
             wrapped(layout, "Perhaps: no such run has been timed on this machine yet", "TIME")
         job_state(layout, child, "see Results")
         others = [job for job in start_child.running() if job.key != SIMULATION.key(root)]
@@ -69,9 +69,10 @@ class MU_PT_simulate(UnitPanel, bpy.types.Panel):
             body.prop(study, "folder")
 
 
-def start_words(root) -> str:
-    """Label of the button: the job, and its expected duration from measurements on this machine."""
-    return timed("Simulate", announced(root))
+def start_words(root, name: str = "Simulate", quick: bool = False) -> str:
+    """Label of a button: the job, and its expected duration, measured on this machine or declared."""
+    expected = announced(root, quick)
+    return name if expected is None else timed(name, expected)
 
 
 def _effects(layout, root) -> None:

@@ -6,7 +6,6 @@ By hand stay the fields that a panel asks for in its own way, the words on a but
 from __future__ import annotations
 
 import hashlib
-import re
 from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 from typing import Any
@@ -17,9 +16,9 @@ from ...errors import MuError
 from ...reading import file_bytes, parse_json
 from ...run.folder import write_run
 from ...run.progress_estimate import Plan
-from ...run.study import REPORT_S, Study
+from ...run.study import Study
 from ...run.summary import SUMMARY
-from ...studies import STUDIES, study
+from ...studies import study
 from ..jobs.panel import timed
 from ..jobs.start_child import SOLVER, JobKind, lacking
 from ..shared.blender_property import exact
@@ -27,7 +26,6 @@ from ..shared.file_cache import FileCache
 from ..shared.wording import in_panel
 from . import study_folder, timings
 
-_NUMBER = re.compile(r"[\d.]+")
 OF_UNIT = ("unit", "path")
 """Inputs that are the unit's own parameters."""
 
@@ -110,21 +108,12 @@ class StudyJob:
 
     def announced(self, root: Any) -> tuple[float, bool]:
         """Expected seconds, and True if every stage was measured on this machine; raises MuError."""
-        plan, known = self._expected(root)
+        plan, known = timings.expected(self.inputs(root))
         return sum(seconds for _, seconds in plan), known
 
     def plan(self, root: Any) -> Plan:
         """Expected stages with the seconds of each; raises MuError."""
-        return self._expected(root)[0]
-
-    def _expected(self, root: Any) -> tuple[Plan, bool]:
-        wanted = self.inputs(root)
-        expected, taken = wanted.expected(), timings.measured(wanted.detail())
-        # Members of a set differ in a number: one takes about as long as another.
-        alike = {_NUMBER.sub("", title): seconds for title, seconds in taken.items()}
-        known = {title: taken.get(title, alike.get(_NUMBER.sub("", title))) for title in expected}
-        plan = [(title, expected[title] if s is None else s) for title, s in known.items()]
-        return [*plan, ("report", taken.get("report", REPORT_S))], None not in known.values()
+        return timings.expected(self.inputs(root))[0]
 
     def child(self, root: Any) -> Any:
         """Its own child of this session, running or ended, or None."""
@@ -161,9 +150,3 @@ class StudyJob:
             return ""
         own = "other parameters" if changed[0] in OF_UNIT else f"another {changed[0].replace('_', ' ')}"
         return f"made with {own}"
-
-
-def timed_study(folder: Path) -> tuple[str, dict[str, float]]:
-    """Detail of a finished study, and the seconds of its stages; raises MuError."""
-    kind = next(study(name) for name in STUDIES if (folder / f"{name}.toml").is_file())
-    return kind.read(folder).detail(), parse_json(file_bytes(folder / SUMMARY), SUMMARY)["seconds"]

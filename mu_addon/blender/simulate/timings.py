@@ -3,51 +3,39 @@
 from __future__ import annotations
 
 import json
+import re
 from collections.abc import Callable
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 from ...errors import MuError
 from ...files import write_text
 from ...reading import file_bytes, parse_json
 from ...run.child import DONE
-from ...studies import unit_runs
+from ...run.progress_estimate import Plan
+from ...run.study import Study
+from ...run.summary import SUMMARY
+from ...studies.starting import kind_of
 from ..jobs import start_child
 from ..shared.compat import user_folder
 from ..shared.file_cache import UNREADABLE, FileCache
 from ..shared.registration import at_end, connected
 
-if TYPE_CHECKING:
-    from ...simulate_and_place.expected import Size
-
 LEAST_SHARE = 0.05
 """A stage that took less than this share of its earlier time was cached, and is not a measurement."""
 
 
-def of_size(size: Size) -> str:
-    """Detail under which a simulation's seconds are kept: those of another unit or mesh are other ones."""
-    contact = "contact" if size.self_contact else "no contact"
-    part = "" if min(size.pressures_kPa) < 0 else ", under pressure"
-    return f"{size.chambers} chambers, refine {size.refine:g}, {contact}{part}"
+# Members of a set differ in a number: one takes about as long as another.
+_NUMBER = re.compile(r"[\d.]+")
 
 
-def of_run(run: unit_runs.Run) -> str:
-    """Detail of a run's seconds, as `of_size`."""
-    from ...simulate_and_place.expected import SHIPPED_KPA, Size
-
-    contact = bool(run.tables.get("simulate", {}).get("self_contact"))
-    pressures = tuple(p for p in SHIPPED_KPA if p > 0 or not run.left_out)
-    return of_size(Size(run.unit.chambers.count, run.refine, contact, pressures))
+def of_run(folder: Path) -> tuple[str, dict[str, float]]:
+    """Detail of a finished study, and the seconds of its stages; raises MuError."""
+    return kind_of(folder).read(folder).detail(), parse_json(file_bytes(folder / SUMMARY), SUMMARY)["seconds"]
 
 
-def _of_simulation(folder: Path) -> tuple[str, dict[str, Any]]:
-    run = unit_runs.read_run(folder)
-    return of_run(run), run.summary["seconds"]
-
-
-READERS: dict[str, Callable[[Path], tuple[str, dict[str, Any]]]] = {"simulate": _of_simulation}
-"""By kind of job: function of a finished run's folder that returns its detail and its stages' seconds."""
-
+READERS: dict[str, Callable[[Path], tuple[str, dict[str, Any]]]] = {}
+"""By kind of job, what is in place of `of_run`."""
 _kept: FileCache[dict[str, dict[str, float]]] = FileCache()
 
 
@@ -56,7 +44,7 @@ def _file() -> Path:
 
 
 def _every() -> dict[str, Any]:
-    """Content of the file, by detail: of a simulation, see `of_size`."""
+    """Content of the file, by detail of a study."""
     path = _file()
     return _kept.read([path], lambda: parse_json(file_bytes(path), path.name)) or {}
 
@@ -67,6 +55,18 @@ def measured(detail: str) -> dict[str, float]:
     if not isinstance(found, dict):
         return {}
     return {str(k): float(v) for k, v in found.items() if isinstance(v, int | float) and v >= 0.0}
+
+
+def expected(wanted: Study) -> tuple[Plan, bool]:
+    """Stages of a study with the seconds that they took here, else are declared to take.
+
+    The second result is True if all were measured.
+    """
+    declared, taken = wanted.expected(), measured(wanted.detail())
+    alike = {_NUMBER.sub("", title): seconds for title, seconds in taken.items()}
+    known = {title: taken.get(title, alike.get(_NUMBER.sub("", title))) for title in declared}
+    plan = [(title, declared[title] if s is None else s) for title, s in known.items()]
+    return [*plan, ("report", taken.get("report", wanted.report_s))], None not in known.values()
 
 
 def announced(detail: str) -> float | None:
@@ -85,9 +85,9 @@ def note(detail: str, seconds: dict[str, float]) -> None:
 @connected(start_child.JOB_ENDED)
 def _ended(key: str) -> None:
     child = start_child.child_of(key)
-    read = READERS.get(key.rpartition(":")[2])
-    if child is None or child.state != DONE or read is None:
+    if child is None or child.state != DONE:
         return
+    read = READERS.get(key.rpartition(":")[2], of_run)
     try:
         detail, seconds = read(child.folder.parent)
         note(detail, {str(name): float(s) for name, s in seconds.items()})

@@ -166,7 +166,7 @@ def test_the_button_says_what_a_grasp_will_take_by_what_was_measured_here(tmp_pa
     grasps.GRASPING.write(root, tmp_path / "out")
     seconds = {"solid": 3.0, "mesh": 5.0, "grasp of 20 mm": 582.0, "light": 4.0, "report": 6.0}
     (tmp_path / "out" / "summary.json").write_text(json.dumps({"seconds": seconds}), encoding="utf-8")
-    timings.note(*timings.READERS["grip"](tmp_path / "out"))
+    timings.note(*timings.of_run(tmp_path / "out"))
     assert "Grasp, about 10 min" in drawn()
     assert dict(grasps.GRASP.plan_of(root))["grasp of 20 mm"] == 582.0, (
         "and the bar counts by the same figure"

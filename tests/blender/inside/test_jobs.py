@@ -25,7 +25,7 @@ from mu_addon.blender.sensor import state as sensor
 from mu_addon.blender.simulate import panel as simulate_panel
 from mu_addon.blender.simulate import study_folder as studies
 from mu_addon.blender.simulate import timings
-from mu_addon.blender.simulate.job import SIMULATION, announced, plan_of
+from mu_addon.blender.simulate.job import SIMULATION, announced, job_of, plan_of
 from mu_addon.blender.simulate.panel import start_words
 from mu_addon.blender.unit import object as unit_object
 from mu_addon.errors import InputError
@@ -161,12 +161,13 @@ def test_a_bar_is_short_whatever_a_stage_is_called(monkeypatch):
     ended(child)
 
 
-def test_a_plan_has_the_stages_of_the_job_and_the_seconds_of_the_last_run(study):
+def test_a_plan_has_the_stages_of_the_job_and_the_seconds_of_the_last_run(study, tmp_path, monkeypatch):
+    monkeypatch.setattr(timings, "_file", lambda: tmp_path / "timings.json")
     root = add(preset="mu-0.75x")
     root.mu_unit.study.command = "simulate"
     assert [name for name, _ in plan_of(root)] == ["solid", "mesh", "Model A", "report"]
-    root.mu_unit.study.folder = str(study)
-    seconds = studies.findings(root).summary["seconds"]
+    detail, seconds = timings.of_run(study)
+    timings.note(detail, seconds)
     assert dict(plan_of(root))["Model A"] != seconds["Model A"], (
         "a run on a coarser mesh tells nothing of this one"
     )
@@ -178,19 +179,21 @@ def test_the_button_says_what_it_will_take_by_what_was_measured_here(tmp_path, m
     root.mu_unit.study.command = "simulate"
     assert not announced(root)[1]
     assert start_words(root).startswith("Simulate, perhaps ")
-    # It follows what is changed: the chambers, and suction without contact.
+    # It follows what is changed: a coarser mesh, and suction whose walls pass through each other.
     whole, _ = announced(root)
-    root.mu_unit.study.self_contact = False
+    root.mu_unit.study.refine = 0.35
     assert announced(root)[0] < 0.9 * whole
+    root.mu_unit.study.refine = 0.5
+    root.mu_unit.study.self_contact = False
+    assert announced(root)[0] > whole
     root.mu_unit.study.self_contact = True
-    timings.note(
-        "6 chambers, refine 0.5, contact", {"solid": 2.0, "mesh": 8.0, "Model A": 500.0, "report": 30.0}
-    )
+    detail = job_of(root).detail()
+    timings.note(detail, {"solid": 2.0, "mesh": 8.0, "Model A": 500.0, "report": 30.0})
     assert announced(root) == (540.0, True)
     assert start_words(root) == "Simulate, about 9 min"
     assert dict(plan_of(root))["Model A"] == 500.0, "and the bar counts by the same figure"
     # Found in the cache: that is no time that a new one takes.
-    timings.note("6 chambers, refine 0.5, contact", {"Model A": 1.0})
+    timings.note(detail, {"Model A": 1.0})
     assert announced(root) == (540.0, True)
     assert [rounded(s) for s in (3, 41, 95, 1500, 7200, 12600)] == [
         "10 s", "40 s", "2 min", "25 min", "2 h", "3 h 30 min",

@@ -325,7 +325,7 @@ def test_an_export_as_chosen(tmp_path, monkeypatch):
     assert "unit.3mf" not in texts
     assert "Done in" in texts
     assert "Export, about" not in texts
-    timings.note(*timings.READERS["print"](printing.folder_of(root, "export")))
+    timings.note(*timings.of_run(printing.folder_of(root, "export")))
     assert "Export, about" in drawn(), "by what it took"
     assert "Stale: they belong" not in texts
     root.mu_unit.chambers.wall_mm = 1.0
