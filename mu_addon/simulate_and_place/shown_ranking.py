@@ -270,7 +270,7 @@ def estimate_parts(study: Any, J_mm: Mapping[str, float]) -> Iterator[Part]:
     anchors = {path.name: path.anchors for path in paths_of(study)}
     yield Sentence(
         "No path was solved yet. Estimated by the linear response of the unit under pressure; exact ones "
-        "differ by some 5 to 30 %, and paths close to each other may change places."
+        "differ by some 5 to 40 %, and paths close to each other may change places."
     )
     head = [("path", ""), ("anchors", "line"), ("estimated Ĵ [mm]", "n")]
     rows = [[label(name), anchors[name], f"{J:.2f}"] for name, J in J_mm.items()]
