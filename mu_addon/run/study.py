@@ -563,9 +563,8 @@ class Study:
         for one in self.all_stages().values():
             if not (one.title and one.wanted(self)):
                 continue
-            # A set whose members share a title need not be made for it.
-            named = one.over is not None and not one.over.grows and "{" in one.title
-            for member in one.over.members(self) if one.over and named else [None]:
+            members = [None] if one.over is None or one.over.grows else one.over.members(self)
+            for member in members:
                 title = one.title if member is None else one.title_of(member)
                 if title not in found:
                     found[title] = one.seconds(self, title)

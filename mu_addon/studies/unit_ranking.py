@@ -77,7 +77,7 @@ def _way(study: UnitStudy, member: core.Member) -> Mapping[str, Any]:
 
 def _number(study: UnitStudy, path: str) -> Mapping[str, Any]:
     """A candidate's number."""
-    return {"number": study.compared.names.index(path)}
+    return {"number": study.path_names.index(path)}
 
 
 def _at_pressures(study: UnitStudy, member: core.Member) -> Mapping[str, Any]:
@@ -262,6 +262,11 @@ class UnitStudy(UnitMotion):
         """Windows of anchors of the candidate paths."""
         return design.windows(self.unit.chambers.count)
 
+    @property
+    def path_names(self) -> tuple[str, ...]:
+        """Names of the candidate paths."""
+        return tuple(one.name for one in self.windows)
+
     @cached_property
     def candidate_paths(self) -> tuple[placement.Candidate, ...]:
         """The candidate paths."""
@@ -270,8 +275,7 @@ class UnitStudy(UnitMotion):
     @property
     def compared(self) -> core.Comparison:
         """What candidates are compared at."""
-        names = tuple(one.name for one in self.candidate_paths)
-        return core.Comparison(names, self.samples, self.effects.has_gravity)
+        return core.Comparison(self.path_names, self.samples, self.effects.has_gravity)
 
     @property
     def limits(self) -> placement.Limits:
@@ -392,7 +396,7 @@ class UnitStudy(UnitMotion):
     @stage(
         "candidates",
         taking("candidates"),
-        over=Over(("number",), lambda study: study.compared.names, gives=_number),
+        over=Over(("number",), lambda study: study.path_names, gives=_number),
         wanted=_in_time,
         parallel=True,
     )
@@ -619,7 +623,7 @@ class UnitStudy(UnitMotion):
     @stage(
         "motion of the paths",
         taking("motion of the paths"),
-        over=Over(("path",), lambda study: study.compared.names),
+        over=Over(("path",), lambda study: study.path_names),
         wanted=_by_pressure,
         kept=False,
     )
