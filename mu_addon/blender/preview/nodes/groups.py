@@ -31,14 +31,8 @@ def _tubes(tree) -> None:
     w.socket("Radius", "Float", 1.0, 0.0, 1000.0, "Radius, or factor on the point attribute `radius`")
     w.socket("Material", "Material")
     curve = w.curves(w.given("Geometry"))
-    radius = w.node("GeometryNodeInputNamedAttribute", {"data_type": "FLOAT"}, Name="radius")
-    own = w.node(
-        "GeometryNodeSwitch",
-        {"input_type": "FLOAT"},
-        Switch=radius.outputs["Exists"],
-        False_=1.0,
-        True_=radius.outputs["Attribute"],
-    ).outputs[0]
+    radius = w.attribute("radius")
+    own = w.switch("FLOAT", radius["Exists"], 1.0, radius["Attribute"])
     scaled = w.math("MULTIPLY", own, w.given("Radius"))
     circle = w.node("GeometryNodeCurvePrimitiveCircle", Resolution=w.given("Sides"), Radius=1.0)
     sweep = w.node("GeometryNodeCurveToMesh", Profile_Curve=circle.outputs["Curve"], Fill_Caps=True)
@@ -46,9 +40,7 @@ def _tubes(tree) -> None:
     # Ends are flat, as a print's are: smooth ones look like dark holes. A tube's sides have four corners.
     corners = w.node("GeometryNodeInputMeshFaceNeighbors").outputs["Vertex Count"]
     sides = w.node("FunctionNodeCompare", {"data_type": "INT", "operation": "EQUAL"}, A=corners, B=4)
-    smooth = w.smooth(sweep.outputs["Mesh"], sides.outputs["Result"])
-    painted = w.node("GeometryNodeSetMaterial", Geometry=smooth, Material=w.given("Material"))
-    w.output(painted.outputs["Geometry"])
+    w.output(w.painted(w.smooth(sweep.outputs["Mesh"], sides.outputs["Result"])))
 
 
 def _balls(tree) -> None:
@@ -57,18 +49,16 @@ def _balls(tree) -> None:
     w.socket("Geometry", "Geometry")
     w.socket("Detail", "Int", 3, 1, 6, "Subdivisions of a ball")
     w.socket("Material", "Material")
-    radius = w.node("GeometryNodeInputNamedAttribute", {"data_type": "FLOAT"}, Name="radius")
+    radius = w.attribute("radius")["Attribute"]
     ball = w.node("GeometryNodeMeshIcoSphere", Radius=1.0, Subdivisions=w.given("Detail"))
     placed = w.node(
         "GeometryNodeInstanceOnPoints",
         Points=w.given("Geometry"),
         Instance=ball.outputs["Mesh"],
-        Scale=radius.outputs["Attribute"],
+        Scale=radius,
     )
     real = w.node("GeometryNodeRealizeInstances", Geometry=placed.outputs["Instances"])
-    smooth = w.smooth(real.outputs["Geometry"])
-    painted = w.node("GeometryNodeSetMaterial", Geometry=smooth, Material=w.given("Material"))
-    w.output(painted.outputs["Geometry"])
+    w.output(w.painted(w.smooth(real.outputs["Geometry"])))
 
 
 def _labelled(tree, tube_group) -> None:
@@ -80,9 +70,8 @@ def _labelled(tree, tube_group) -> None:
     w.socket("Size", "Float", 3.0, 0.0, 1000.0, "Height of the letters")
     w.socket("Material", "Material")
     w.socket("In Viewport", "Bool", True, text="Show the name in the viewport, too, not in renders alone")
-    tube = w.node("GeometryNodeGroup", {"node_tree": tube_group})
-    tree.links.new(w.given("Geometry"), tube.inputs["Geometry"])
-    tree.links.new(w.given("Material"), tube.inputs["Material"])
+    own = {"Geometry": w.given("Geometry"), "Material": w.given("Material")}
+    tube = w.node("GeometryNodeGroup", {"node_tree": tube_group}, **own)
     written = w.node("GeometryNodeStringToCurves", String=w.given("Label"), Size=w.given("Size"))
     real = w.node("GeometryNodeRealizeInstances", Geometry=written.outputs[0])
     filled = w.node("GeometryNodeFillCurve", Curve=real.outputs["Geometry"])
@@ -90,24 +79,12 @@ def _labelled(tree, tube_group) -> None:
     turned = w.node(
         "GeometryNodeTransform", Geometry=filled.outputs["Mesh"], Translation=w.given("At"), Rotation=upright
     )
-    painted = w.node(
-        "GeometryNodeSetMaterial", Geometry=turned.outputs["Geometry"], Material=w.given("Material")
-    )
+    painted = w.painted(turned.outputs["Geometry"])
     # Names are drawn over the viewport; the text is for renders.
-    rendered = w.node("FunctionNodeBooleanMath", {"operation": "NOT"})
-    tree.links.new(w.node("GeometryNodeIsViewport").outputs[0], rendered.inputs[0])
-    seen = w.node("FunctionNodeBooleanMath", {"operation": "OR"})
-    tree.links.new(w.given("In Viewport"), seen.inputs[0])
-    tree.links.new(rendered.outputs[0], seen.inputs[1])
-    named = w.node("GeometryNodeSwitch", {"input_type": "GEOMETRY"}, Switch=seen.outputs[0])
-    tree.links.new(
-        painted.outputs["Geometry"], next(s for s in named.inputs if s.enabled and s.name == "True")
-    )
-    both = w.node("GeometryNodeJoinGeometry")
-    # A join takes the last link first; the order does not matter here.
-    tree.links.new(tube.outputs["Geometry"], both.inputs[0])
-    tree.links.new(named.outputs[0], both.inputs[0])
-    w.output(both.outputs[0])
+    viewport = w.node("GeometryNodeIsViewport").outputs[0]
+    rendered = w.in_order("FunctionNodeBooleanMath", {"operation": "NOT"}, viewport)
+    seen = w.in_order("FunctionNodeBooleanMath", {"operation": "OR"}, w.given("In Viewport"), rendered)
+    w.output(w.joined(tube.outputs["Geometry"], w.switch("GEOMETRY", seen, true=painted)))
 
 
 def _colour_field(tree) -> None:
@@ -118,11 +95,11 @@ def _colour_field(tree) -> None:
     w.socket("Low", "Float", 0.0, text="Value of the ramp's first colour")
     w.socket("High", "Float", 1.0, text="Value of the ramp's last colour")
     w.socket("Material", "Material", text="Material whose ramp reads `mu_colour`")
-    value = w.node("GeometryNodeInputNamedAttribute", {"data_type": "FLOAT"}, Name=w.given("Attribute"))
+    value = w.attribute(w.given("Attribute"))["Attribute"]
     scaled = w.node(
         "ShaderNodeMapRange",
         {"clamp": True},
-        Value=value.outputs["Attribute"],
+        Value=value,
         From_Min=w.given("Low"),
         From_Max=w.given("High"),
     )
@@ -133,10 +110,7 @@ def _colour_field(tree) -> None:
         Name="mu_colour",
         Value=scaled.outputs["Result"],
     )
-    painted = w.node(
-        "GeometryNodeSetMaterial", Geometry=stored.outputs["Geometry"], Material=w.given("Material")
-    )
-    w.output(painted.outputs["Geometry"])
+    w.output(w.painted(stored.outputs["Geometry"]))
 
 
 TUBES = Group(

@@ -29,11 +29,10 @@ def _build(tree, tube_group, ball_group) -> None:
     w.socket("Anchors", "Material", text="Material of the anchors")
     for name in RESULTS:
         w.socket(name, "Object", text="Object that plays a study's motion")
-    kind = w.node("GeometryNodeInputNamedAttribute", {"data_type": "INT"}, Name=SKIN).outputs[0]
+    kind = w.attribute(SKIN, "INT")["Attribute"]
 
     def those(value: int):
-        same = w.node("FunctionNodeCompare", {"data_type": "INT", "operation": "EQUAL"}, B=value)
-        tree.links.new(kind, next(s for s in same.inputs if s.enabled and s.name == "A"))
+        same = w.node("FunctionNodeCompare", {"data_type": "INT", "operation": "EQUAL"}, A=kind, B=value)
         return w.node(
             "GeometryNodeSeparateGeometry",
             {"domain": "POINT"},
@@ -41,41 +40,28 @@ def _build(tree, tube_group, ball_group) -> None:
             Selection=same.outputs["Result"],
         ).outputs["Selection"]
 
-    struts = w.node("GeometryNodeGroup", {"node_tree": tube_group})
-    joints = w.node("GeometryNodeGroup", {"node_tree": ball_group}, Detail=2)
-    anchors = w.node("GeometryNodeGroup", {"node_tree": ball_group})
-    for node, value, detail, material in (
-        (struts, TUBE, "Sides", "Struts"),
-        (joints, NODE, "", "Struts"),
-        (anchors, BALL, "Detail", "Anchors"),
-    ):
-        tree.links.new(those(value), node.inputs["Geometry"])
-        if detail:
-            tree.links.new(w.given(detail), node.inputs[detail])
-        tree.links.new(w.given(material), node.inputs["Material"])
-    both = w.node("GeometryNodeJoinGeometry")
-    # A join takes the last link first: the mesh's own slots stay the first ones.
-    for geometry in (*(n.outputs["Geometry"] for n in (anchors, joints, struts)), those(PLAIN)):
-        tree.links.new(geometry, both.inputs[0])
-    played = w.node("GeometryNodeJoinGeometry")
-    for name in RESULTS:
-        # Its mesh, with colours and materials: an instance of a hidden object would not be drawn.
-        found = w.node(
-            "GeometryNodeObjectInfo", {"transform_space": "ORIGINAL"}, Object=w.given(name), As_Instance=False
-        )
-        tree.links.new(found.outputs["Geometry"], played.inputs[0])
+    def skinned(group, value: int, material: str, **inputs):
+        own = {"Geometry": those(value), "Material": w.given(material), **inputs}
+        return w.node("GeometryNodeGroup", {"node_tree": group}, **own).outputs["Geometry"]
+
+    struts = skinned(tube_group, TUBE, "Struts", Sides=w.given("Sides"))
+    joints = skinned(ball_group, NODE, "Struts", Detail=2)
+    anchors = skinned(ball_group, BALL, "Anchors", Detail=w.given("Detail"))
+    # The mesh's own slots stay the first ones.
+    both = w.joined(anchors, joints, struts, those(PLAIN))
+    # Their meshes, with colours and materials: an instance of a hidden object would not be drawn.
+    shape = {"transform_space": "ORIGINAL"}
+    found = [w.node("GeometryNodeObjectInfo", shape, Object=w.given(n), As_Instance=False) for n in RESULTS]
+    played = w.joined(*(node.outputs["Geometry"] for node in found))
     # Brought into another file it may have lost them: then the design is seen, and never nothing.
-    size = w.node("GeometryNodeAttributeDomainSize", {"component": "MESH"}, Geometry=played.outputs[0])
+    size = w.node("GeometryNodeAttributeDomainSize", {"component": "MESH"}, Geometry=played)
     there = w.node(
         "FunctionNodeCompare",
         {"data_type": "INT", "operation": "GREATER_THAN"},
         A=size.outputs["Point Count"],
         B=0,
     )
-    chosen = w.node("GeometryNodeSwitch", {"input_type": "GEOMETRY"}, Switch=there.outputs["Result"])
-    tree.links.new(both.outputs[0], next(s for s in chosen.inputs if s.enabled and s.name == "False"))
-    tree.links.new(played.outputs[0], next(s for s in chosen.inputs if s.enabled and s.name == "True"))
-    w.output(chosen.outputs[0])
+    w.output(w.switch("GEOMETRY", there.outputs["Result"], both, played))
 
 
 UNIT = Group(NAME, _VERSION, _TEXT, _build, (TUBES.name, BALLS.name))

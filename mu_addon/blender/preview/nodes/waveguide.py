@@ -40,7 +40,7 @@ def _build(tree) -> None:
     )
     sweep = w.node("GeometryNodeCurveToMesh", Profile_Curve=square.outputs["Geometry"], Fill_Caps=True)
     link_radius(tree, sweep, curve, diagonal)
-    bar = w.node("GeometryNodeSetMaterial", Geometry=sweep.outputs["Mesh"], Material=w.given("Material"))
+    bar = w.painted(sweep.outputs["Mesh"])
 
     # The part with the wells: whole pitches, centred on each curve, half a pitch or more from its ends.
     # Normals are captured from the whole curve, since those of a part may differ.
@@ -62,56 +62,36 @@ def _build(tree) -> None:
         Start=start,
         End=w.math("ADD", start, w.math("MAXIMUM", reach, 1e-3)),
     )
-    # A little less than the pitch, so that rounding does not lower the count; points are spread evenly
-    # anyway.
+    # A little less than the pitch, so that rounding does not lower the count: points are spread evenly.
     places = w.node(
         "GeometryNodeCurveToPoints",
         {"mode": "LENGTH"},
         Curve=part.outputs["Curve"],
         Length=w.math("MULTIPLY", w.given("Pitch"), 0.9999),
     )
-    normal = w.node("GeometryNodeInputNamedAttribute", {"data_type": "FLOAT_VECTOR"}, Name="mu_normal")
-    turn = w.node("FunctionNodeAxesToRotation", {"primary_axis": "Z", "secondary_axis": "X"})
-    w.tree.links.new(places.outputs["Tangent"], turn.inputs[0])
-    w.tree.links.new(normal.outputs["Attribute"], turn.inputs[1])
+    axes = {"primary_axis": "Z", "secondary_axis": "X"}
+    normal = w.attribute("mu_normal", "FLOAT_VECTOR")["Attribute"]
+    turn = w.in_order("FunctionNodeAxesToRotation", axes, places.outputs["Tangent"], normal)
     # Beyond the face that it opens, so that no two faces coincide.
     over = w.math("MULTIPLY", w.given("Section"), 0.04)
     tall = w.math("ADD", w.given("Well Depth"), over)
-    size = w.node("ShaderNodeCombineXYZ")
-    for name, value in (
-        ("X", tall),
-        ("Y", w.math("ADD", w.given("Section"), over)),
-        ("Z", w.given("Well Width")),
-    ):
-        tree.links.new(value, size.inputs[name])
+    wide = w.math("ADD", w.given("Section"), over)
+    size = w.node("ShaderNodeCombineXYZ", X=tall, Y=wide, Z=w.given("Well Width"))
     box = w.node("GeometryNodeMeshCube", Size=size.outputs["Vector"])
     # From the axis outward to the face, less half the well, plus the margin.
     lift = w.math("SUBTRACT", w.math("ADD", half, over), w.math("MULTIPLY", tall, 0.5))
-    up = w.node("ShaderNodeCombineXYZ")
-    tree.links.new(lift, up.inputs["X"])
+    up = w.node("ShaderNodeCombineXYZ", X=lift)
     lifted = w.node("GeometryNodeTransform", Geometry=box.outputs["Mesh"], Translation=up.outputs["Vector"])
     wells = w.node(
         "GeometryNodeInstanceOnPoints",
         Points=places.outputs["Points"],
         Instance=lifted.outputs["Geometry"],
-        Rotation=turn.outputs["Rotation"],
+        Rotation=turn,
     )
     real = w.node("GeometryNodeRealizeInstances", Geometry=wells.outputs["Instances"])
-    shown = w.node("GeometryNodeSetMaterial", Geometry=real.outputs["Geometry"], Material=w.given("Wells"))
-    cut = w.node("GeometryNodeMeshBoolean", {"operation": "DIFFERENCE"})
-    tree.links.new(bar.outputs["Geometry"], cut.inputs["Mesh 1"])
-    tree.links.new(shown.outputs["Geometry"], cut.inputs["Mesh 2"])
-    both = w.node("GeometryNodeJoinGeometry")
-    for part in (bar, shown):
-        tree.links.new(part.outputs["Geometry"], both.inputs[0])
-    chosen = w.node(
-        "GeometryNodeSwitch",
-        {"input_type": "GEOMETRY"},
-        Switch=w.given("Cut"),
-        False_=both.outputs[0],
-        True_=cut.outputs["Mesh"],
-    )
-    w.output(chosen.outputs[0])
+    shown = w.painted(real.outputs["Geometry"], "Wells")
+    cut = w.node("GeometryNodeMeshBoolean", {"operation": "DIFFERENCE"}, Mesh_1=bar, Mesh_2=shown)
+    w.output(w.switch("GEOMETRY", w.given("Cut"), w.joined(bar, shown), cut.outputs["Mesh"]))
 
 
 WAVEGUIDE = Group(NAME, _VERSION, _TEXT, _build)

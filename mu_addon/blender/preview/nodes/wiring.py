@@ -33,7 +33,7 @@ class Wiring:
     def node(self, kind: str, settings: dict[str, Any] | None = None, **inputs: Any):
         """Add a node; `settings`: of the node; `inputs`: values, or sockets to link from.
 
-        A name in `inputs` has _ for a space; False_ and True_ are the sockets of a switch.
+        A name in `inputs` has _ for a space.
         """
         node = self.tree.nodes.new(kind)
         node.location = (self._x, 0.0)
@@ -41,31 +41,54 @@ class Wiring:
         for name, value in (settings or {}).items():
             setattr(node, name, value)
         for name, value in inputs.items():
-            (socket, *_) = (s for s in node.inputs if s.enabled and s.name == name.replace("_", " ").strip())
-            if hasattr(value, "is_output"):
-                self.tree.links.new(value, socket)
-            else:
-                socket.default_value = value
+            (socket, *_) = (s for s in node.inputs if s.enabled and s.name == name.replace("_", " "))
+            self._set(socket, value)
         return node
+
+    def _set(self, socket: Any, value: Any) -> None:
+        """Give an input a value, or link it from a socket."""
+        if hasattr(value, "is_output"):
+            self.tree.links.new(value, socket)
+        else:
+            socket.default_value = value
 
     def curves(self, geometry: Any):
         """Every curve of a geometry, and the edges of its mesh as curves."""
         parts = self.node("GeometryNodeSeparateComponents", Geometry=geometry)
         edges = self.node("GeometryNodeMeshToCurve", Mesh=parts.outputs["Mesh"])
+        return self.joined(parts.outputs["Curve"], edges.outputs["Curve"])
+
+    def attribute(self, name: Any, kind: str = "FLOAT"):
+        """Values of a named attribute, and True where it exists."""
+        return self.node("GeometryNodeInputNamedAttribute", {"data_type": kind}, Name=name).outputs
+
+    def joined(self, *geometries: Any):
+        """Several geometries as one, the last first: a join takes the last link first."""
         both = self.node("GeometryNodeJoinGeometry")
-        for source in (parts.outputs["Curve"], edges.outputs["Curve"]):
-            self.tree.links.new(source, both.inputs[0])
+        for geometry in geometries:
+            self.tree.links.new(geometry, both.inputs[0])
         return both.outputs[0]
 
     def math(self, operation: str, *values: Any):
         """A number from one or two others, each a socket or a value."""
-        node = self.node("ShaderNodeMath", {"operation": operation})
+        return self.in_order("ShaderNodeMath", {"operation": operation}, *values)
+
+    def switch(self, kind: str, condition: Any, false: Any = None, true: Any = None):
+        """One of two values of a kind by a condition; None for an input that stays empty."""
+        given = {name: value for name, value in (("False", false), ("True", true)) if value is not None}
+        return self.node("GeometryNodeSwitch", {"input_type": kind}, Switch=condition, **given).outputs[0]
+
+    def in_order(self, kind: str, settings: dict[str, Any], *values: Any):
+        """The output of a node whose inputs, not told apart by their names, are given in their order."""
+        node = self.node(kind, settings)
         for socket, value in zip(node.inputs, values, strict=False):
-            if hasattr(value, "is_output"):
-                self.tree.links.new(value, socket)
-            else:
-                socket.default_value = value
+            self._set(socket, value)
         return node.outputs[0]
+
+    def painted(self, geometry: Any, material: str = "Material"):
+        """A geometry in the material of an input."""
+        given = self.given(material)
+        return self.node("GeometryNodeSetMaterial", Geometry=geometry, Material=given).outputs["Geometry"]
 
     def smooth(self, mesh: Any, selection: Any = None):
         """The mesh, shaded smooth; the node's first input is called Geometry before 5.0 and Mesh since.
@@ -80,5 +103,4 @@ class Wiring:
 
     def output(self, geometry: Any) -> None:
         """End the group with a geometry."""
-        out = self.node("NodeGroupOutput")
-        self.tree.links.new(geometry, out.inputs["Geometry"])
+        self.node("NodeGroupOutput", Geometry=geometry)
