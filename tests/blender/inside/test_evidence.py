@@ -1,7 +1,6 @@
 """Measured data in Blender: checked, diagnosed, shown on the timeline, put into the unit."""
 
 import csv
-import importlib.util
 import json
 import math
 import re
@@ -19,7 +18,6 @@ from mu_addon.blender.evidence import timeline as evidence_motion
 from mu_addon.blender.simulate import effects, timings
 from mu_addon.blender.simulate import panel as panels
 from mu_addon.blender.simulate import study_folder as studies
-from mu_addon.blender.simulate.job import SIMULATION
 from mu_addon.blender.unit import object as unit_object
 from mu_addon.blender.unit.properties import to_unit
 from mu_addon.evidence.extended import ExtendedModel, Fitted
@@ -130,8 +128,8 @@ def test_from_data_to_a_unit_that_has_what_was_found(blocks, tmp_path, monkeypat
     assert stale in refused(bpy.ops.mu.evidence_apply)
 
 
-def applied(folder, clogged):
-    """A unit that was given what its verdict named, saved and read again; returns it and what it asks for."""
+def test_what_has_no_parameter_is_applied_undone_saved_and_removed(tmp_path, clogged):
+    folder = tmp_path
     shutil.copytree(clogged / "study", folder / "study")
     bpy.context.preferences.edit.use_global_undo = True
     bpy.ops.wm.save_as_mainfile(filepath=str(folder / "seat.blend"))
@@ -171,50 +169,17 @@ def applied(folder, clogged):
     bpy.ops.wm.save_mainfile()
     bpy.ops.wm.open_mainfile(filepath=bpy.data.filepath)
     (root,) = unit_object.roots()
-    asked = {"effects": {"clogged_chamber": {"share_lost": share}}}
-    assert effects.inputs(root) == asked
+    assert effects.inputs(root) == {"effects": {"clogged_chamber": {"share_lost": share}}}
     assert "Applied to the unit" in drawn(panels.MU_PT_simulate)
-    return root, asked
-
-
-def test_what_has_no_parameter_is_applied_undone_saved_and_removed(tmp_path, clogged):
-    root, _ = applied(tmp_path, clogged)
-    assert bpy.ops.mu.evidence_remove() == {"FINISHED"}
-    assert "With named effects" not in drawn(panels.MU_PT_simulate)
-    assert not effects.named_effects(root)
-
-
-@pytest.mark.nightly("test_what_has_no_parameter_is_applied_undone_saved_and_removed")
-def test_what_has_no_parameter_goes_into_the_simulation(tmp_path, clogged):
-    """Simulated, changed and removed; found again as what the results are of."""
-    root, asked = applied(tmp_path, clogged)
-
-    def simulated():
-        assert bpy.ops.mu.simulate() == {"FINISHED"}
-        child = SIMULATION.child(root)
-        ended(child)
-        assert child.state == "done", child.error
-        return studies.findings(root)
-
-    found = simulated()
-    assert not found.stale
-    assert found.summary["study"]["effects"] == asked["effects"]
-    root.mu_unit.study.orientation_deg = 90.0
-    assert not studies.findings(root).stale
-
-    # Weight has a direction, and results of another one are stale.
+    before = studies.design_of(root)
+    # Weight has a direction: results of another one are of another design.
     known = Fitted(1300.0, 50.0, 1200.0, 1400.0, "kg/m3")
     effects.keep(root, ExtendedModel("named", {"gravity": {"density_kg_m3": known}}, {}).text())
-    assert studies.findings(root).stale
     assert "gravity, density: 1300 kg/m3 (1200 to 1400)" in drawn(panels.MU_PT_simulate).replace("  ", " ")
-    level = simulated()
-    assert not level.stale
-    assert level.summary["study"]["orientation_deg"] == 90.0
-    assert dict(level.angles)[0.0] < -0.5
-    root.mu_unit.study.orientation_deg = -90.0
-    assert studies.findings(root).stale
+    weighed = studies.design_of(root)
+    root.mu_unit.study.orientation_deg = 90.0
+    assert len({before, weighed, studies.design_of(root)}) == 3
     assert bpy.ops.mu.evidence_remove() == {"FINISHED"}
-    assert studies.findings(root).stale
     assert "With named effects" not in drawn(panels.MU_PT_simulate)
     assert not effects.named_effects(root)
 
@@ -347,27 +312,6 @@ def test_what_was_not_seen_is_not_there(tmp_path):
             assert abs(found["measured|marker 2"].location[1] - 0.5 * (frame - 1)) < 1e-4
             assert found["measured|marker 2"].location[0] == 0.0
     assert "6 of 30 values of angle_deg are missing" in drawn()
-
-
-def test_without_the_solver_measured_motion_is_shown_and_the_panel_says_why(blocks, monkeypatch):
-
-    find = importlib.util.find_spec
-    monkeypatch.setattr(
-        importlib.util, "find_spec", lambda name, *a: None if name == "warp" else find(name, *a)
-    )
-    root = add()
-    root.mu_evidence.folder = str(blocks)
-    assert "1x: 4 rows" in drawn()
-    assert "Not in this Blender: warp" in refused(bpy.ops.mu.evidence_diagnose)
-
-
-def test_the_verdict_files_are_read_as_diagnose_writes_them(clogged):
-    """What the panel shows stands in the files under these names."""
-    found = json.loads((clogged / "study" / "evidence" / "verdict.json").read_text())
-    summary = json.loads((clogged / "study" / "evidence" / "summary.json").read_text())
-    assert {"verdict", "causes", "gain", "residual_table"} <= found.keys()
-    assert {"headline", "sentence", "next", "status"} <= summary.keys()
-    assert {"against", "p_value", "where"} <= found["residual_table"][0].keys()
 
 
 def test_a_diagnosis_that_was_broken_off_shows_no_verdict(tmp_path, clogged):

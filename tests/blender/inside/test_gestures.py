@@ -16,7 +16,7 @@ from mu_addon.blender.simulate.job import SIMULATION
 from mu_addon.blender.unit import object as unit_object
 from mu_addon.blender.unit.fields import field
 from mu_addon.blender.unit.properties import to_unit
-from mu_addon.design.parameters import Chambers, load_preset
+from mu_addon.design.parameters import Chambers
 from mu_addon.design.quantity import describe
 
 from .acting import add, refused
@@ -75,29 +75,6 @@ def test_a_click_anywhere_on_a_unit_is_on_the_unit():
     assert bpy.context.selected_objects == [root]
     bpy.ops.object.select_all(action="SELECT")
     assert bpy.context.selected_objects == [root]
-
-
-def test_a_click_on_a_candidate_works_on_its_unit():
-    root = add()
-    root.mu_unit.candidates = True
-    tube = candidates.candidate(root, "alpha3")
-    select(tube)
-    assert unit_object.active_root(bpy.context) == root
-    assert "Use α3" in drawn([bpy.types.MU_PT_path])
-    assert bpy.ops.mu.path() == {"FINISHED"}
-    assert root.mu_unit.path == "alpha3"
-
-
-def test_moved_and_turned_as_a_whole():
-    root = add()
-    low, high = corners(root)
-    bpy.ops.transform.translate(value=(30.0, 0.0, 5.0))
-    bpy.context.view_layer.update()
-    assert np.allclose(np.subtract(corners(root), (low, high)), (30.0, 0.0, 5.0), atol=1e-3)
-    bpy.ops.transform.rotate(value=np.pi / 2, orient_axis="Z")
-    bpy.context.view_layer.update()
-    turned = size(root)
-    assert np.allclose(turned[[1, 0, 2]], high - low, atol=1e-2)
     # Its size is a parameter of the design: S would show another unit than the one that is simulated.
     assert list(root.lock_scale) == [True] * 3
 
@@ -223,20 +200,6 @@ def test_a_new_name_shows_in_the_panel_and_keeps_the_results(study):
     assert unit_object.solid_is_current(root)
     root.mu_unit.title = "Index"
     assert root.name == "Index"
-
-
-def test_a_parent_moves_it():
-    root = add()
-    low, high = corners(root)
-    frame = bpy.data.objects.new("frame", None)
-    bpy.context.collection.objects.link(frame)
-    select(root, frame)
-    assert bpy.ops.object.parent_set(type="OBJECT") == {"FINISHED"}
-    frame.location = (7.0, 0.0, 0.0)
-    bpy.context.view_layer.update()
-    assert np.allclose(np.subtract(corners(root), (low, high)), (7.0, 0.0, 0.0), atol=1e-3)
-    root.mu_unit.chambers.wall_mm = 0.95
-    assert root.parent == frame
 
 
 def test_hidden_and_moved_to_a_collection_as_a_whole():
@@ -510,21 +473,6 @@ def test_a_new_unit_lands_beside_what_is_there():
     for i, (low, high) in enumerate(boxes):
         for other_low, other_high in boxes[:i]:
             assert ((low > other_high) | (other_low > high)).any()
-
-
-def test_two_units_keep_apart_through_save_and_reopen(tmp_path):
-    first, second = add(preset="mu-0.75x"), add()
-    second.mu_unit.cut = True
-    first.mu_unit.candidates = True
-    uuids = first.mu_unit.uuid, second.mu_unit.uuid
-    before = size(first).copy(), size(second).copy()
-    bpy.ops.wm.save_as_mainfile(filepath=str(tmp_path / "two.blend"))
-    bpy.ops.wm.open_mainfile(filepath=bpy.data.filepath)
-    first, second = (unit_object.by_uuid(uuid) for uuid in uuids)
-    assert np.allclose([size(first), size(second)], before)
-    assert len(belonging(first)) == 11
-    assert belonging(second) == [second]
-    assert to_unit(first.mu_unit) == load_preset("mu-0.75x")
 
 
 def test_a_preset_keeps_a_name_of_the_users():

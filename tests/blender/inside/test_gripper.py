@@ -5,7 +5,6 @@ from pathlib import Path
 
 import bpy
 import numpy as np
-import pytest
 
 from mu_addon.blender.gripper import object as gripper_object
 from mu_addon.blender.gripper import panel as gripper_panel
@@ -23,7 +22,6 @@ from mu_addon.studies.grip import Grip
 
 from .acting import add, refused
 from .drawing import drawn as drawn_by
-from .jobs import ended
 
 PANELS = gripper_panel
 
@@ -281,30 +279,6 @@ def test_an_unsaved_files_grasp_goes_where_saving_finds_it(tmp_path):
         path = bpy.path.abspath(part.modifiers["Motion"].filepath)
         assert Path(path).is_file(), path
     assert grasps.of(root) is not None
-
-
-@pytest.mark.nightly("test_a_grasp_plays_on_the_timeline")
-def test_a_coarse_grasp_from_start_to_timeline(tmp_path):
-    root = held()
-    props = root.mu_gripper
-    props.folder, props.cube_mm = str(tmp_path / "out"), 25.0
-    assert bpy.ops.mu.grasp() == {"FINISHED"}
-    child = grasps.GRASP.child(root)
-    ended(child)
-    assert child.state == "done", child.error
-    found = grasps.of(root)
-    assert not found.stale
-    assert found.figures["normal_at_hold_N"] > 0
-    assert bpy.ops.mu.grasp_show() == {"FINISHED"}
-    left, _, cube = grasp_motion.parts(root)
-    hold = found.columns["time_s"][max(i for i, p in enumerate(found.phase) if p == "iii")]
-    bpy.context.scene.frame_set(1 + round(24 * hold))
-    graph = bpy.context.evaluated_depsgraph_get()
-    at = motion_parts.vertices_of(left.evaluated_get(graph).data)
-    # The finger is wider than the cube: beside it, it bulges past the cube's face.
-    beside = (np.abs(at[:, 0]) < 12.5) & (np.abs(at[:, 2] - cube.matrix_world.translation.z) < 12.5)
-    inner = at[beside, 1].max()
-    assert abs(inner + 12.5) < 0.3, f"the left finger's face lies on the cube's: {inner}"
 
 
 def test_both_fingers_are_cut_open_toward_the_same_side():

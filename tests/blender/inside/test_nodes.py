@@ -5,7 +5,6 @@ import bmesh
 import bpy
 import numpy as np
 import pytest
-from mathutils import Vector
 
 from mu_addon.blender.assets import dropped, library
 from mu_addon.blender.assets.group_pictures import group_pixels
@@ -83,23 +82,6 @@ def test_a_colour_field_scales_a_value():
     colour = [a.value for a in mesh.attributes["mu_colour"].data]
     assert np.allclose(colour, [0.25, 1.0])
     assert [a.value for a in mesh.attributes["stress_kPa"].data] == [5.0, 30.0]
-
-
-def test_an_old_group_is_renewed_in_place():
-    obj = edge(10.0, [1.0, 1.0])
-    modifier = nodes.skin(obj, "MU Tubes")
-    tree = modifier.node_group
-    set_modifier_input(modifier, "Sides", 11)
-    before = skinned(obj)
-    tree["mu_version"] = 0
-    tree.nodes.clear()
-    assert nodes.group("MU Tubes") == tree == modifier.node_group
-    assert tree["mu_version"] == nodes.GROUPS["MU Tubes"].version
-    assert modifier_input(modifier, "Sides") == 11
-    assert len(before) == 22
-    assert np.allclose(skinned(obj), before)
-    assert all(nodes.group(name).asset_data is not None for name in nodes.GROUPS)
-    assert len(bpy.data.node_groups) == len(nodes.GROUPS)
 
 
 def test_a_group_that_is_there_is_not_built_again():
@@ -354,11 +336,15 @@ def test_presets_and_groups_become_an_asset_library_of_the_users():
     assert list(folder.iterdir()) == []
 
 
-@pytest.mark.parametrize("scene", ["paths", "obstacle", "gripper", "measured", "tree"])
+@pytest.mark.parametrize("scene", ["overview", "paths", "obstacle", "gripper", "measured", "tree"])
 def test_a_sample_scene_for_each_task_has_what_it_begins_with_in_view(scene):
     assert bpy.ops.mu.sample(scene=scene) == {"FINISHED"}
     bpy.context.view_layer.update()
+    there = bpy.data.objects.get
     made = {
+        "overview": lambda: (
+            there("In a Body of Its Own").mu_unit.envelope and closed_volume(there("Waveguide on a Curve"))
+        ),
         "paths": lambda: unit_object.roots()[0].mu_unit.candidates,
         "obstacle": lambda: obstacles.of_unit(unit_object.roots()[0]),
         "gripper": gripper_object.roots,
@@ -374,31 +360,6 @@ def test_a_sample_scene_for_each_task_has_what_it_begins_with_in_view(scene):
     assert bodies
     for obj in bodies:
         assert (obj.matrix_world.translation - view.view_location).length < view.view_distance
-
-
-def test_the_sample_scene():
-
-    assert bpy.ops.mu.sample() == {"FINISHED"}
-    whole, opened, bodied = (bpy.data.objects[n] for n in ("Whole", "Cut Open", "In a Body of Its Own"))
-    assert {r.mu_unit.trouble for r in (whole, opened, bodied)} == {""}
-    assert opened.mu_unit.cut
-    assert opened.mu_unit.path == "alpha4"
-    assert bodied.mu_unit.envelope is not None
-    curve = bpy.data.objects["Waveguide on a Curve"]
-    assert closed_volume(curve) > 0
-    # It is framed: every corner of it lies within the view, and fills a good part of it.
-    area = next(a for w in bpy.context.window_manager.windows for a in w.screen.areas if a.type == "VIEW_3D")
-    space = area.spaces.active
-    half = 36.0 / space.lens
-    seen = []
-    for obj in (whole, opened, bodied, curve):
-        for corner in obj.bound_box:
-            x, y, z = space.region_3d.view_rotation.inverted() @ (
-                obj.matrix_world @ Vector(corner) - space.region_3d.view_location
-            )
-            depth = space.region_3d.view_distance - z
-            seen.append(max(abs(x) / (half * depth), abs(y) / (0.6 * half * depth)))
-    assert 0.5 < max(seen) <= 1.0
 
 
 def test_an_asset_is_called_as_its_preset_beside_a_unit_of_that_name():

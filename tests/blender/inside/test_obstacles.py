@@ -4,23 +4,18 @@ from unittest.mock import patch
 
 import bpy
 import numpy as np
-import pytest
 from mathutils import Vector
 
 from mu_addon.blender.body.state import FLAWS
 from mu_addon.blender.jobs import start_child
 from mu_addon.blender.obstacles import state as obstacles
-from mu_addon.blender.results import legend
-from mu_addon.blender.results import motion as motion_parts
 from mu_addon.blender.simulate import study_folder as studies
-from mu_addon.blender.simulate.job import SIMULATION
 from mu_addon.blender.unit import drawing
 from mu_addon.blender.unit import object as unit_object
 from mu_addon.design.surface import volume
 from mu_addon.studies.unit_ranking import UnitStudy
 
 from .acting import add, refused
-from .jobs import watch
 
 
 def ball(at, name="Ball", radius=8.0):
@@ -151,44 +146,3 @@ def test_a_box_stands_before_the_tip():
     assert abs(box.mu_obstacle.friction - 0.1) < 1e-6
     assert bpy.ops.mu.obstacle_check() == {"FINISHED"}
     assert not obstacles.placed(root, box).flaws
-
-
-@pytest.mark.nightly("test_what_moves_or_is_edited_is_another_obstacle")
-def test_a_box_in_the_way_is_met_and_its_move_makes_the_study_stale(tmp_path):
-
-    def bent(folder):
-        root.mu_unit.study.folder = str(tmp_path) + folder
-        assert bpy.ops.mu.simulate() == {"FINISHED"}
-        child = SIMULATION.child(root)
-        watch(lambda: child.state != "running")
-        assert child.state == "done", child.error
-        return dict(studies.findings(root).angles)[20.0]
-
-    root = add(preset="mu-0.75x")
-    protocol = tmp_path / "inflate.csv"
-    protocol.write_text("time_s,pressure_kPa\n0,0\n8,20\n")
-    study = root.mu_unit.study
-    study.command, study.refine, study.protocol = "simulate", 0.3, str(protocol)
-    free = bent("/free")
-    assert studies.contact_forces(root) == []
-    assert bpy.ops.mu.obstacle_box(size=(20, 12, 12), gap=0.6) == {"FINISHED"}
-    bpy.context.view_layer.update()
-    assert studies.findings(root).stale, "it was free to move then"
-    stopped = bent("/met")
-    assert 1.0 < stopped < free - 1.0, (stopped, free)
-    (touch,) = studies.contact_forces(root)
-    assert touch.name == "Obstacle"
-    assert touch.force_N[0] == 0.0
-    assert touch.time_s[touch.force_N.argmax()] == 8.0, "at the protocol's peak"
-    bpy.context.scene.frame_set(193)
-    texts = legend.lines(root, motion_parts.motion_of(root), bpy.context.scene)
-    assert f"Obstacle: {touch.force_N.max():.2f} N" in texts
-
-    assert not studies.findings(root).stale
-    (box,) = obstacles.of_unit(root)
-    for aside, stale in ((0.5, True), (-0.5, False)):
-        box.location.y += aside
-        bpy.context.view_layer.update()
-        assert studies.findings(root).stale == stale
-    box.mu_obstacle.friction = 0.1
-    assert studies.findings(root).stale

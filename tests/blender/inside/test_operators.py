@@ -244,6 +244,7 @@ def test_path_select_and_stale_names():
     tube = candidates.candidate(root, "alpha7")
     bpy.context.view_layer.objects.active = tube
     assert unit_object.active_root(bpy.context) == root
+    assert "Use α7" in drawn([bpy.types.MU_PT_path])
     assert bpy.ops.mu.path() == {"FINISHED"}
     assert root.mu_unit.path == "alpha7"
     assert tube.data.materials[0].name == "MU Waveguide"

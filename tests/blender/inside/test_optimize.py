@@ -290,6 +290,9 @@ def test_a_proposed_unit_is_applied_undone_and_added_beside(tmp_path):
     ):  # fmt: skip
         assert expected in texts, (expected, texts)
     assert "other parameters" not in texts
+    finished(root, seconds={"search": 60.0}, designs=3)
+    expected = 20.0 * root.mu_optimize.evaluations
+    assert dict(optimization.plan_of(root))["search"] == expected, "it takes as long again"
     name = root.name
     bpy.ops.ed.undo_push(message="found")
     assert bpy.ops.mu.optimize_apply(number=1) == {"FINISHED"}
@@ -360,27 +363,3 @@ def test_a_coarser_mesh_and_fewer_units_are_expected_to_take_less():
     assert by_refinement > 2.0
     check = "check of what is proposed"
     assert usual[check] / quick[check] == pytest.approx(2 * by_refinement)
-
-
-@pytest.mark.nightly("test_properties_are_written_as_the_file_that_the_core_reads")
-def test_a_search_from_the_panel_to_a_thinner_wall_in_the_scene(tmp_path):
-    """The whole way with a real, rough search: a unit that bends further has a thinner wall."""
-    root = add()
-    root.mu_unit.chambers.count = 2
-    root.mu_unit.study.folder = str(tmp_path)
-    target(root, "angle", pressure_kPa=10.0, ask="maximise")
-    free(root, "chambers.wall_mm", low=0.8, high=1.0)
-    props = root.mu_optimize
-    props.self_contact = False
-    props.evaluations, props.refine, props.check_refine = 3, 0.25, 0.3
-    assert bpy.ops.mu.optimize() == {"FINISHED"}
-    child = optimization.OPTIMIZATION.child(root)
-    ended(child)
-    assert child.state == "done", child.error
-    found = optimization.findings(root)
-    assert found.status == "complete"
-    assert "angle at 10 kPa" in drawn()
-    assert bpy.ops.mu.optimize_apply(number=1) == {"FINISHED"}
-    assert 0.8 <= to_unit(root.mu_unit).chambers.wall_mm < 0.9
-    (search, seconds), *_ = optimization.plan_of(root)
-    assert (search, seconds) == ("search", found.seconds["search"]), "it is expected to take as long again"

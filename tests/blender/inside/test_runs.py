@@ -174,6 +174,9 @@ def test_a_run_that_is_compared_with_itself_shows_no_difference(home):
     assert "compared with: tick another one" in drawn(PANELS)
     words = legend.lines(root, motion_parts.motion_of(root), bpy.context.scene)
     assert "the run compared with itself" in words
+    row = "time_s,obstacle,force_x_N,force_y_N,force_z_N\n0,Box.obj,0,3,4\n"
+    (studies.results_folder(root) / studies.CONTACT).write_text(row)
+    assert "Box: 5.00 N" in legend.lines(root, motion_parts.motion_of(root), bpy.context.scene)
     assert "compared with: tick" in refused(bpy.ops.mu.field_show, field="run_difference_mm")
 
 

@@ -5,7 +5,6 @@ import json
 from unittest.mock import MagicMock
 
 import bpy
-import numpy as np
 import pytest
 
 import mu_addon
@@ -22,7 +21,6 @@ from mu_addon.blender.simulate.job import SIMULATION, job_of
 from mu_addon.blender.unit import object as unit_object
 from mu_addon.blender.unit.base_classes import parameters
 from mu_addon.meshing.settings import MeshSettings
-from mu_addon.report.motion_files import read_motion
 
 from .acting import add, refused
 from .drawing import drawn as drawn_by
@@ -56,14 +54,14 @@ def test_panels_tell_what_a_child_says():
     assert "too thick" in drawn()
 
 
-def test_without_the_solver_geometry_works_and_the_panel_says_why(monkeypatch):
-
+def test_without_the_solver_geometry_works_and_the_panel_says_why(monkeypatch, blocks):
     find = importlib.util.find_spec
     monkeypatch.setattr(
         importlib.util, "find_spec", lambda name, *a: None if name == "warp" else find(name, *a)
     )
-    add()
+    add().mu_evidence.folder = str(blocks)
     assert jobs.missing() == ["warp"]
+    assert "Not in this Blender: warp" in refused(bpy.ops.mu.evidence_diagnose)
     assert "Cannot simulate: warp not found" in drawn()
     assert "Not in this Blender: warp" in refused(bpy.ops.mu.simulate)
     assert bpy.ops.mu.solid() == {"FINISHED"}
@@ -176,25 +174,3 @@ def test_the_printed_body_is_simulated_on_the_mesh_that_is_asked_for():
     assert job_of(root).mesh.refine == 0.7
     study.self_contact = False
     assert not job_of(root).self_contact
-
-
-@pytest.mark.nightly("test_a_motion_from_start_to_stale")
-def test_printed_struts_are_simulated_and_played(tmp_path):
-    """A short unit, inflated a little: its motion is that of its struts, drawn up to their wall."""
-    bpy.ops.wm.save_as_mainfile(filepath=str(tmp_path / "struts.blend"))
-    root = add()
-    root.mu_unit.chambers.count = 3
-    protocol = tmp_path / "inflate.csv"
-    protocol.write_text("time_s,pressure_kPa\n0,0\n1,2\n")
-    root.mu_unit.study.command = "simulate"
-    root.mu_unit.study.protocol = str(protocol)
-    assert bpy.ops.mu.simulate() == {"FINISHED"}
-    child = SIMULATION.child(root)
-    watch(lambda: child.state != "running")
-    assert child.state == "done", child.error
-    found = studies.findings(root)
-    assert found.angles[-1][1] > 0.5
-    motion = read_motion(studies.results_folder(root))
-    assert motion.mesh.resolved
-    skin = motion.skin("lattice", cut=False)
-    assert not np.isin(skin.node[skin.triangles], motion.mesh.tied).all(axis=1).any()
