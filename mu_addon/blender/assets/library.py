@@ -47,8 +47,10 @@ def write() -> Path:
         for group in groups:
             _picture(group, group_pixels(group.name, _PIXELS))
         _write(folder / FILE, groups)
-        write_units(folder / UNITS_FILE)
-        write_resins_and_printers(folder / MADE_FILE)
+        titles = _titles()
+        with _set_aside({*titles.values(), *names_of_all()}):
+            _write_units(folder / UNITS_FILE, titles)
+            _write_resins_and_printers(folder / MADE_FILE)
     finally:
         # Unused data are not left in this file.
         for tree in set(bpy.data.node_groups) - before:
@@ -60,13 +62,6 @@ def write() -> Path:
     lines = [f"{uuid}:{path}:{path.replace(' ', '-').replace('/', '-')}" for uuid, path in named.items()]
     write_text(folder / CATALOGUES, "\n".join(["VERSION 1", "", *lines, ""]))
     return folder
-
-
-def write_units(target: Path) -> None:
-    """Write every preset as an object that is an asset. Raises OutputError."""
-    titles = _titles()
-    with _set_aside(set(titles.values())):
-        _write_units(target, titles)
 
 
 def _titles() -> dict[str, str]:
@@ -84,13 +79,8 @@ def _set_aside(names: set[str]) -> Iterator[None]:
 
     Names are unique in a file: with a unit of that name in it, the preset would be "mu-1.0x.001".
     """
-    data = [
-        d
-        for kind in (bpy.data.objects, bpy.data.meshes, bpy.data.materials)
-        for d in kind
-        if d.library is None
-    ]
-    named = [(d, d.name) for d in data if d.name in names]
+    kinds = bpy.data.objects, bpy.data.meshes, bpy.data.materials
+    named = [(d, d.name) for kind in kinds for d in kind if d.library is None and d.name in names]
     try:
         for d, name in named:
             d.name = f"{name} aside"
@@ -101,6 +91,7 @@ def _set_aside(names: set[str]) -> Iterator[None]:
 
 
 def _write_units(target: Path, titles: dict[str, str]) -> None:
+    """Write every preset as an object that is an asset. Raises OutputError."""
     context = bpy.context
     active, selected = context.view_layer.objects.active, list(context.selected_objects)
     roots = []
@@ -130,23 +121,22 @@ def _write_units(target: Path, titles: dict[str, str]) -> None:
         context.view_layer.objects.active = active
 
 
-def write_resins_and_printers(target: Path) -> None:
+def _write_resins_and_printers(target: Path) -> None:
     """Write every shipped resin and printer as an asset. Raises OutputError."""
-    with _set_aside(names_of_all()):
-        catalogues = {RESINS_CATALOGUE: resins(), PRINTERS_CATALOGUE: printers()}
-        made = [data for group in catalogues.values() for data in group]
-        try:
-            for catalogue, group in catalogues.items():
-                for data in group:
-                    data.asset_data.catalog_id = catalogue
-                    _picture(data, pixels_of(data, _PIXELS))
-            _write(target, set(made))
-        finally:
-            for data in made:
-                if isinstance(data, bpy.types.Material):
-                    bpy.data.materials.remove(data)
-                else:
-                    bpy.data.meshes.remove(data.data)
+    catalogues = {RESINS_CATALOGUE: resins(), PRINTERS_CATALOGUE: printers()}
+    made = [data for group in catalogues.values() for data in group]
+    try:
+        for catalogue, group in catalogues.items():
+            for data in group:
+                data.asset_data.catalog_id = catalogue
+                _picture(data, pixels_of(data, _PIXELS))
+        _write(target, set(made))
+    finally:
+        for data in made:
+            if isinstance(data, bpy.types.Material):
+                bpy.data.materials.remove(data)
+            else:
+                bpy.data.meshes.remove(data.data)
 
 
 def _picture(data: Any, pixels: np.ndarray[Any, Any]) -> None:

@@ -20,13 +20,15 @@ from ..unit import object as unit_object
 APART_MM = 130.0
 
 
-def build(context: Any, name: str = "overview") -> list[Any]:
-    """Build the sample scene of that name, in view; return its roots."""
-    return SCENES[name][1](context)
+def build(context: Any, name: str = "overview") -> None:
+    """Build the sample scene of that name, in view."""
+    made = SCENES[name][1](context)
+    context.view_layer.update()
+    viewports.frame(made)
 
 
 def _overview(context: Any) -> list[Any]:
-    """Add three units, whole, cut open with paths, and in a body, and a curve; return the roots."""
+    """Add three units, whole, cut open with paths, and in a body, and a curve."""
     cursor = context.scene.cursor.location.copy()
     roots = []
     try:
@@ -51,8 +53,7 @@ def _overview(context: Any) -> list[Any]:
     # Beside the units, which are placed beside objects at the cursor.
     curve = _curve(context, whole.location + _beside(context, 3))
     context.view_layer.objects.active = whole
-    viewports.frame([*roots, curve])
-    return roots
+    return [*roots, curve]
 
 
 def _unit(context: Any, preset: str = "mu-0.75x") -> Any:
@@ -65,8 +66,6 @@ def _paths(context: Any) -> list[Any]:
     root = _unit(context)
     root.mu_unit.cut = root.mu_unit.candidates = True
     root.mu_unit.study.command = "place"
-    context.view_layer.update()
-    viewports.frame([root])
     return [root]
 
 
@@ -76,9 +75,7 @@ def _obstacle(context: Any) -> list[Any]:
     root.mu_unit.study.command = "simulate"
     bpy.ops.mu.obstacle_box(size=(20.0, 12.0, 12.0), gap=0.6)
     context.view_layer.objects.active = root
-    context.view_layer.update()
-    viewports.frame([root, *obstacles.of_unit(root)])
-    return [root]
+    return [root, *obstacles.of_unit(root)]
 
 
 def _gripper(context: Any) -> list[Any]:
@@ -86,16 +83,13 @@ def _gripper(context: Any) -> list[Any]:
     bpy.ops.mu.gripper_add()
     root = gripper_object.active(context)
     root.mu_gripper.detail = "quick"
-    context.view_layer.update()
-    viewports.frame([root, *root.children])
-    return [root]
+    return [root, *root.children]
 
 
 def _measured(context: Any) -> list[Any]:
     """A unit with the paper's compression tests as measured data, ready for *Diagnose*."""
     root = _unit(context, "mu-1.0x")
     root.mu_evidence.folder = str(asset_root() / "examples" / "paper-moduli")
-    viewports.frame([root])
     return [root]
 
 
@@ -106,7 +100,6 @@ def _tree(context: Any) -> list[Any]:
     bpy.ops.mu.path(name="alpha4")
     bpy.ops.mu.tree_of_unit(steps=True)
     bpy.ops.mu.tree_show()
-    viewports.frame([root])
     return [root]
 
 
@@ -118,7 +111,7 @@ SCENES: dict[str, tuple[str, Callable[[Any], list[Any]]]] = {
     "measured": ("A unit with measured data, ready for Diagnose", _measured),
     "tree": ("A unit that follows the node tree of its steps", _tree),
 }
-"""Sample scenes by name: their description, and the function that makes them."""
+"""Sample scenes by name: their description, and the function that makes one, which returns what is framed."""
 
 
 def _beside(context: Any, number: int) -> Any:

@@ -7,13 +7,13 @@ from bpy.props import StringProperty
 from ...errors import InputError
 from ..jobs import start_child
 from ..jobs.operators import job_operators
-from ..shared import updates, viewports
+from ..shared import viewports
 from ..shared.operators import operator, unless
 from ..simulate import effects
 from ..simulate import study_folder as studies
 from ..unit import object as unit_object
 from ..unit.base_classes import UnitOperator, ValidUnitOperator
-from ..unit.properties import from_unit, to_unit
+from ..unit.properties import to_unit
 from . import state as evidence
 from . import timeline
 
@@ -68,11 +68,9 @@ def evidence_apply(operator, root):
     beside = extended.effects.words()
     own = [words for words in extended.applied if words not in beside]
     evidence.mark_applied(root, "; ".join(own), "; ".join(beside))
-    with updates.paused():
-        from_unit(root.mu_unit, extended.unit)
     # The diagnosis ignored the simulation's earlier effects: its own replace them.
     effects.keep(root, extended.kept.text() if extended.effects else "")
-    unit_object.rebuild(root)
+    unit_object.take(root, extended.unit)
     operator.report({"INFO"}, f"Applied: {'; '.join(extended.applied)}")
 
 

@@ -4,7 +4,7 @@
 
 import csv
 import hashlib
-from collections.abc import Iterable
+from collections.abc import Callable, Iterable
 from pathlib import Path
 from typing import Any
 
@@ -22,12 +22,12 @@ from ...reading import file_bytes, file_text, parse_json, parse_toml
 from ...run.folder import write_run
 from ..jobs.start_child import JobKind
 from ..shared.blender_property import path_property
-from ..shared.file_cache import FileCache
+from ..shared.file_cache import UNREADABLE, FileCache
 from ..shared.registration import property_of
 from ..shared.wording import error_text
 from ..simulate import effects, timings
 from ..simulate import study_folder as studies
-from ..unit.properties import shape_hash, to_unit
+from ..unit.properties import shape_hash, shape_now, to_unit
 
 FOLDER = "evidence"
 """Folder of the diagnosis in the unit's study folder."""
@@ -151,15 +151,21 @@ def diagnosis(root: Any) -> ShownVerdict | None:
 def _read_run(
     summary: Path, verdict: Path, inputs: Path, unit: Path
 ) -> tuple[dict[str, Any], dict[str, Any], dict[str, Any], str]:
+    of = _content(unit, lambda path: shape_hash(read_unit(path)), "unreadable") if unit.is_file() else ""
+    named = _content(inputs, lambda path: parse_toml(file_text(path), path.name), {})
+    return _content(summary, _json, {}), _content(verdict, _json, {}), named, of
+
+
+def _content(path: Path, read: Callable[[Path], Any], otherwise: Any) -> Any:
+    """What `read` finds in a file, or another value where it cannot be read."""
     try:
-        named = parse_toml(file_text(inputs), inputs.name)
-    except (OSError, ValueError, MuError):
-        named = {}
-    try:
-        of = shape_hash(read_unit(unit)) if unit.is_file() else ""
-    except MuError:
-        of = "unreadable"
-    return _json(summary), _json(verdict), named, of
+        return read(path)
+    except UNREADABLE:
+        return otherwise
+
+
+def _json(path: Path) -> dict[str, Any]:
+    return dict(parse_json(file_bytes(path), path.name))
 
 
 def write_inputs(root: Any, folder: Path) -> None:
@@ -172,26 +178,14 @@ def write_inputs(root: Any, folder: Path) -> None:
     write_run(folder, Diagnose.layout(), study.texts())
 
 
-def _json(path: Path) -> dict[str, Any]:
-    try:
-        found = parse_json(file_bytes(path), path.name)
-    except (OSError, ValueError, MuError):
-        return {}
-    return found if isinstance(found, dict) else {}
-
-
 def _stale(root: Any, inputs: dict[str, Any], unit: str) -> str:
     found = measured_data(root)
     if found is None or found.measured is None:
         return "its measured data are not here"
     if inputs.get("data") != found.digest:
         return "made with other measured data"
-    try:
-        now = shape_hash(to_unit(root.mu_unit))
-    except MuError:
-        now = ""
     # Without a unit's own file the verdict does not depend on the unit.
-    return "made with other parameters" if unit and now != unit else ""
+    return "made with other parameters" if unit and shape_now(root.mu_unit) != unit else ""
 
 
 def mark_applied(root: Any, to_unit_: str, to_simulation: str) -> None:

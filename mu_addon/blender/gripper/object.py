@@ -40,13 +40,9 @@ def roots() -> list[Any]:
 
 def active(context: Any) -> Any | None:
     """Gripper to work on: that of the active object, or the only one if no unit is worked on."""
-    obj = unit_object.active_object(context)
-    while obj is not None:
-        if obj.mu_gripper.uuid:
-            return obj
-        if obj.mu_unit.uuid:
-            return None
-        obj = obj.parent
+    above = displays.root_above(unit_object.active_object(context))
+    if above is not None:
+        return above if above.mu_gripper.uuid else None
     found = [o for o in context.scene.objects if o.mu_gripper.uuid]
     return found[0] if len(found) == 1 and unit_object.active_root(context) is None else None
 
@@ -69,13 +65,7 @@ def create(context: Any, gripper: Gripper) -> Any:
 
 def delete(root: Any) -> None:
     """Remove a gripper with its displays; the user's own children stay."""
-    mesh = root.data
-    for child in root.children_recursive:
-        if child.get(displays.OWNER) == root.mu_gripper.uuid:
-            displays.remove(child)
-    bpy.data.objects.remove(root)
-    if not mesh.users:
-        bpy.data.meshes.remove(mesh)
+    displays.remove_root(root)
 
 
 def rebuild(root: Any) -> bool:

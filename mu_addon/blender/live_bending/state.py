@@ -138,9 +138,9 @@ def is_seen(root: Any) -> bool:
 def most_kPa(root: Any) -> float:
     """Largest pressure of a unit that is shown bent live; 0 where it is not."""
     live = of(root)
-    return (
-        0.0 if live is None or live.shape is None or not is_seen(root) else float(live.shape.pressure_kPa[-1])
-    )
+    if live is None or live.shape is None or not is_seen(root):
+        return 0.0
+    return float(live.shape.pressure_kPa[-1])
 
 
 @connected(SWITCHED)

@@ -41,40 +41,28 @@ def make_group(tree, nodes):
     ins, outs = group.nodes.new("NodeGroupInput"), group.nodes.new("NodeGroupOutput")
     ins.location = min(n.location.x for n in nodes) - 250.0, middle[1]
     outs.location = max(n.location.x for n in nodes) + 300.0, middle[1]
-    entering, leaving = {}, {}
-    inner, outer_in, outer_out = [], [], []
-    for link in tree.links:
-        a, b = link.from_node.name in inside, link.to_node.name in inside
-        ends = (
-            (link.from_node.name, link.from_socket.identifier),
-            (link.to_node.name, link.to_socket.identifier),
-        )
-        if a and b:
-            inner.append(ends)
-        elif b:
-            # Links from one socket become one input of the group, however many nodes use it.
-            if ends[0] not in entering:
-                entering[ends[0]] = _item(group, link.to_socket, link.from_socket, "INPUT")
-            outer_in.append((ends, entering[ends[0]]))
-        elif a:
-            if ends[0] not in leaving:
-                leaving[ends[0]] = _item(group, link.from_socket, link.from_socket, "OUTPUT")
-            outer_out.append((ends, leaving[ends[0]]))
-    for before, after in inner:
-        group.links.new(
-            _socket(copies[before[0]].outputs, before[1]), _socket(copies[after[0]].inputs, after[1])
-        )
-    for (_, after), item in outer_in:
-        group.links.new(_socket(ins.outputs, item), _socket(copies[after[0]].inputs, after[1]))
-    for before, item in dict.fromkeys((ends[0], item) for ends, item in outer_out):
-        group.links.new(_socket(copies[before[0]].outputs, before[1]), _socket(outs.inputs, item))
+    ends = [_ends(link) for link in tree.links]
+    items = {}
+    for link, (before, after) in zip(tree.links, ends, strict=True):
+        enters = after[0] in inside
+        # Links from one socket become one socket of the group, however many nodes use it.
+        if (before[0] in inside) != enters and before not in items:
+            like = link.to_socket if enters else link.from_socket
+            items[before] = _item(group, like, link.from_socket, "INPUT" if enters else "OUTPUT")
     node = tree.nodes.new(GROUP)
     node.node_tree, node.location = group, middle
     conversion.sync_groups(tree)
-    for (before, _), item in outer_in:
-        tree.links.new(_socket(tree.nodes[before[0]].outputs, before[1]), _socket(node.inputs, item))
-    for (_, after), item in outer_out:
-        tree.links.new(_socket(node.outputs, item), _socket(tree.nodes[after[0]].inputs, after[1]))
+    for before, after in ends:
+        first, second = copies.get(before[0]), copies.get(after[0])
+        outer_first, outer_second = tree.nodes[before[0]], tree.nodes[after[0]]
+        if first and second:
+            _connect(first, before[1], second, after[1])
+        elif second:
+            _connect(ins, items[before], second, after[1])
+            _connect(outer_first, before[1], node, items[before])
+        elif first:
+            _connect(first, before[1], outs, items[before])
+            _connect(node, items[before], outer_second, after[1])
     for name in inside:
         tree.nodes.remove(tree.nodes[name])
     return node
@@ -89,33 +77,34 @@ def take_apart(tree, node):
     copies = {n.name: _copied(n, tree) for n in own}
     entering: dict[str, list] = {}
     leaving: dict[str, list] = {}
-    for link in tree.links:
-        if link.to_node == node:
-            entering.setdefault(link.to_socket.identifier, []).append(
-                (link.from_node.name, link.from_socket.identifier)
-            )
-        if link.from_node == node:
-            leaving.setdefault(link.from_socket.identifier, []).append(
-                (link.to_node.name, link.to_socket.identifier)
-            )
+    for before, after in map(_ends, tree.links):
+        if after[0] == node.name:
+            entering.setdefault(after[1], []).append(before)
+        if before[0] == node.name:
+            leaving.setdefault(before[1], []).append(after)
     links = []
-    for link in group.links:
-        a, b = link.from_node, link.to_node
-        if a.bl_idname == "NodeGroupInput":
-            befores = entering.get(link.from_socket.identifier, [])
-        else:
-            befores = [(copies[a.name].name, link.from_socket.identifier)]
-        if b.bl_idname == "NodeGroupOutput":
-            afters = leaving.get(link.to_socket.identifier, [])
-        else:
-            afters = [(copies[b.name].name, link.to_socket.identifier)]
-        links += [(before, after) for before in befores for after in afters]
+    for (first, output), (second, taken) in map(_ends, group.links):
+        befores = [(copies[first].name, output)] if first in copies else entering.get(output, [])
+        afters = [(copies[second].name, taken)] if second in copies else leaving.get(taken, [])
+        links += [(*before, *after) for before in befores for after in afters]
     tree.nodes.remove(node)
-    for before, after in links:
-        tree.links.new(
-            _socket(tree.nodes[before[0]].outputs, before[1]), _socket(tree.nodes[after[0]].inputs, after[1])
-        )
+    for first, output, second, taken in links:
+        _connect(tree.nodes[first], output, tree.nodes[second], taken)
     return list(copies.values())
+
+
+def _ends(link):
+    """Name of the node and identifier of the socket that a link comes from, and those that it goes to."""
+    return (
+        (link.from_node.name, link.from_socket.identifier),
+        (link.to_node.name, link.to_socket.identifier),
+    )
+
+
+def _connect(before, output, after, taken):
+    """Link two nodes of a tree by the identifiers of their sockets."""
+    out = next(s for s in before.outputs if s.identifier == output)
+    before.id_data.links.new(out, next(s for s in after.inputs if s.identifier == taken))
 
 
 def _copied(node, tree):
@@ -137,10 +126,6 @@ def _item(group, like, named, in_out):
     """Identifier of a new socket of a group's interface, of the type of a node's socket."""
     kind = like.bl_idname if like.bl_idname.startswith("MU_NS_") else named.bl_idname
     return group.interface.new_socket(name=like.name, in_out=in_out, socket_type=kind).identifier
-
-
-def _socket(found, identifier):
-    return next(s for s in found if s.identifier == identifier)
 
 
 @operator(TreeOperator, "Make Group")

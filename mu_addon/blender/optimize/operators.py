@@ -7,11 +7,10 @@ from bpy.props import EnumProperty, IntProperty
 
 from ...errors import InputError
 from ..jobs.operators import job_operators
-from ..shared import landing, updates
+from ..shared import landing
 from ..shared.operators import operator, unless
 from ..unit import object as unit_object
 from ..unit.base_classes import UnitOperator, ValidUnitOperator
-from ..unit.properties import from_unit
 from . import state as optimization
 
 LONGEST_TITLE = 80
@@ -76,9 +75,7 @@ _NUMBER = IntProperty(name="Proposed Unit", description="Number of the proposed 
 def optimize_apply(root, number):
     """Give the unit the parameters of a proposed one; undo takes them back"""
     core = attrs.evolve(optimization.proposed_unit(root, number), name=root.mu_unit.title)
-    with updates.paused():
-        from_unit(root.mu_unit, core)
-    if not unit_object.rebuild(root):
+    if not unit_object.take(root, core):
         raise InputError(root.mu_unit.trouble)
 
 

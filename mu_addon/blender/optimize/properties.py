@@ -50,6 +50,10 @@ ASKED |= {"curve": ("points", "tolerance"), "minimise": (), "maximise": ()}
 """Fields that each way of asking needs."""
 
 
+def _number(name: str, description: str, default: float, **more):
+    return FloatProperty(name=name, description=description, default=default, precision=3, **more)
+
+
 class MU_PG_target(bpy.types.PropertyGroup):
     """One target of a design: a quantity and its goal."""
 
@@ -98,20 +102,10 @@ class MU_PG_target(bpy.types.PropertyGroup):
             ("maximise", "As Large as Possible", "An objective: several of them give a Pareto front"),
         ],
     )
-    value: FloatProperty(name="Value", description="In the quantity's unit", default=20.0, precision=3)
-    tolerance: FloatProperty(
-        name="Within",
-        description="Tolerance: allowed deviation of the value from the goal",
-        default=1.0,
-        min=1e-6,
-        precision=3,
-    )
-    low: FloatProperty(
-        name="Least", description="Lower bound, in the quantity's unit", default=20.0, precision=3
-    )
-    high: FloatProperty(
-        name="Most", description="Upper bound, in the quantity's unit", default=30.0, precision=3
-    )
+    value: _number("Value", "In the quantity's unit", 20.0)
+    tolerance: _number("Within", "Tolerance: allowed deviation of the value from the goal", 1.0, min=1e-6)
+    low: _number("Least", "Lower bound, in the quantity's unit", 20.0)
+    high: _number("Most", "Upper bound, in the quantity's unit", 30.0)
 
 
 def asks_curve(target) -> bool:
@@ -131,11 +125,11 @@ def _first_range(freedom, context) -> None:
     if freedom.parameter in NAMED:
         freedom.values = ", ".join(names_of(freedom.id_data, freedom.parameter))
         return
-    d = FREE[freedom.parameter]
-    now = present(freedom.id_data, freedom.parameter)
-    step = max(abs(now) * AROUND, 1.0 if d.type is int else 0.0)
+    d, now = FREE[freedom.parameter], present(freedom.id_data, freedom.parameter)
+    whole = d.type is int
+    step = max(abs(now) * AROUND, float(whole))
     low, high = max(now - step, d.low), min(now + step, d.high)
-    if d.type is int:
+    if whole:
         low, high = round(low), round(high)
     if not low < high:
         low, high = d.low, d.high
@@ -242,19 +236,13 @@ class MU_PG_freedom(bpy.types.PropertyGroup):
         description="The values, in the parameter's unit at scale 1, as 0.7, 0.9, 1.1; or the names",
         default="",
     )
-    value: FloatProperty(
-        name="Value", description="In the parameter's unit at scale 1", default=0.9, precision=3
-    )
+    value: _number("Value", "In the parameter's unit at scale 1", 0.9)
+    low: _number("From", "Lowest value, in the parameter's unit at scale 1", 0.7)
+    high: _number("To", "Highest value, in the parameter's unit at scale 1", 1.3)
     true_value: _true("value", "Value")
     true_values: _true_values()
     true_low: _true("low", "From")
     true_high: _true("high", "To")
-    low: FloatProperty(
-        name="From", description="Lowest value, in the parameter's unit at scale 1", default=0.7, precision=3
-    )
-    high: FloatProperty(
-        name="To", description="Highest value, in the parameter's unit at scale 1", default=1.3, precision=3
-    )
 
 
 @property_of(bpy.types.Object, "mu_optimize")

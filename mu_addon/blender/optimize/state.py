@@ -11,7 +11,7 @@ import bpy
 from ...design.parameters import SECTIONS, Unit, read_unit, to_toml
 from ...design.quantity import describe
 from ...design.repairs import tied
-from ...errors import InputError, MuError
+from ...errors import InputError
 from ...optimization.freedoms import Freedom, changed_unit
 from ...optimization.settings import BODY, DESIGN, HEADER, UNIT
 from ...optimization.target_kinds import KINDS
@@ -26,20 +26,19 @@ from ..simulate import effects
 from ..simulate import study_folder as studies
 from ..simulate.study_job import StudyJob
 from ..unit import envelope
-from ..unit.properties import shape_hash, to_unit
+from ..unit.properties import shape_hash, shape_now, to_unit
 from .properties import ASKED, FREE, NAMED, asks_curve, conditions
 
 FOLDER = "optimize"
 """Folder of the optimisation in the unit's study folder."""
-TARGET_KEYS = ("name", "asked", "unit", "value", "objective", "met", "robust")
+TARGET_KEYS = ("name", "asked", "unit", "value", "objective", "met", "robust", "standard_error")
 
 
 @attrs.frozen(eq=False)
 class Proposed:
     """A proposed unit: its file and, as in summary.json, its targets, and texts on changes and reasons.
 
-    targets: of each the values of `TARGET_KEYS` and its standard_error; applied: True if the unit in the
-    scene has its parameters.
+    targets: of each the values of `TARGET_KEYS`; applied: True if the unit in the scene has its parameters.
     """
 
     number: int
@@ -101,9 +100,9 @@ OPTIMIZATION = JobKind(
 
 def target_table(target: Any) -> dict[str, Any]:
     """A target of the panel as its [[target]] table."""
-    given = {key: getattr(target, name) for key, name in conditions(target).items()}
+    given = {key: _plain(getattr(target, name)) for key, name in conditions(target).items()}
     # A path that is searched for is left out.
-    table = {"kind": target.kind} | {key: _plain(value) for key, value in given.items() if value != ""}
+    table = {"kind": target.kind} | {key: value for key, value in given.items() if value != ""}
     if KINDS[target.kind].is_yes:
         return table
     if asks_curve(target):
@@ -116,9 +115,9 @@ def target_table(target: Any) -> dict[str, Any]:
 
 def _plain(value: Any) -> Any:
     """A property's value for a file: numbers by their shortest decimals."""
-    if isinstance(value, str):
-        return value
-    return exact(value) if isinstance(value, float) else [exact(v) for v in value]
+    if isinstance(value, float):
+        return exact(value)
+    return value if isinstance(value, str) else [*map(exact, value)]
 
 
 def _numbers(text: str, between: str) -> list[Any]:
@@ -157,10 +156,9 @@ def freedom_table(freedom: Any) -> dict[str, Any]:
 def document(root: Any) -> dict[str, Any]:
     """Content of design.toml from the panel's targets and freedoms."""
     s = root.mu_optimize
-    more: dict[str, Any] = {"orientation_deg": exact(s.orientation_deg)} if s.has_gravity else {}
-    if s.self_contact:
-        more["self_contact"] = True
-    return more | {
+    return {
+        **({"orientation_deg": exact(s.orientation_deg)} if s.has_gravity else {}),
+        **({"self_contact": True} if s.self_contact else {}),
         "format": 1,
         "unit": UNIT,
         "evaluations": s.evaluations,
@@ -259,7 +257,7 @@ def findings(root: Any) -> Findings | None:
     known = OPTIMIZE.found(root)
     if known is None:
         return None
-    found, now = known.content, _now(root)
+    found, now = known.content, shape_now(root.mu_unit)
     proposed = tuple(attrs.evolve(p, applied=_hash_of(p.file) == now) for p in found.proposed)
     other = now != _hash_of(found.folder / UNIT) and not any(p.applied for p in proposed)
     return attrs.evolve(found, proposed=proposed, other_start=other)
@@ -273,10 +271,7 @@ def _read(summary: Any, folder: Path) -> Findings:
     """Results by summary.json, in their folder."""
     found, proposed = dict(summary), []
     for number, row in enumerate(map(dict, found.get("proposed") or ()), 1):
-        targets = tuple(
-            {key: t[key] for key in TARGET_KEYS} | {"standard_error": float(t["standard_error"] or 0.0)}
-            for t in row.get("targets") or ()
-        )
+        targets = tuple({key: t[key] for key in TARGET_KEYS} for t in row.get("targets") or ())
         texts = (tuple(map(str, row.get(key) or ())) for key in ("changes", "reasons"))
         proposed.append(Proposed(number, folder / Path(str(row["file"])).name, targets, *texts))
     return Findings(
@@ -302,13 +297,6 @@ OPTIMIZE = StudyJob(
     quick=lambda root: False,
     texts=_texts,
 )
-
-
-def _now(root: Any) -> str:
-    try:
-        return shape_hash(to_unit(root.mu_unit))
-    except MuError:
-        return ""
 
 
 def as_kept(unit: Unit) -> Unit:

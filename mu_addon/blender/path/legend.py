@@ -5,7 +5,6 @@ from __future__ import annotations
 from typing import Any
 
 import attrs
-import blf
 import bpy
 import numpy as np
 from bpy_extras.view3d_utils import location_3d_to_region_2d
@@ -70,9 +69,7 @@ def _draw() -> None:
         if end is None:
             continue
         for line, text in enumerate(label(root, known, name), 1):
-            blf.size(0, size)
-            width = blf.dimensions(0, text)[0]
-            legend.write(text, end.x - width / 2.0, end.y - 1.3 * size * line - 0.3 * size, size)
+            legend.write(text, end.x, end.y - 1.3 * size * line - 0.3 * size, size, share=0.5)
     if known.numbers and root.mu_motion.legend:
         _legend(context, root, known)
 

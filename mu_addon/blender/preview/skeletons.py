@@ -211,26 +211,20 @@ def joined(parts: Sequence[Skeleton]) -> Skeleton:
     """Several skeletons as one; an attribute that one of them lacks is 0 there."""
     counts = [len(part.vertices) for part in parts]
     starts = np.concatenate([[0], np.cumsum(counts)])[:-1].astype(int)
-    names = dict.fromkeys(name for part in parts for name in part.attributes)
-    attributes = {
-        name: np.concatenate(
-            [part.attributes.get(name, np.zeros(n)) for part, n in zip(parts, counts, strict=True)]
-        )
-        for name in names
-    }
-    for name, values in attributes.items():
-        if all(np.issubdtype(p.attributes[name].dtype, np.integer) for p in parts if name in p.attributes):
-            attributes[name] = values.astype(np.int32)
+    attributes: dict[str, Any] = {}
+    for name in dict.fromkeys(name for part in parts for name in part.attributes):
+        kind = np.result_type(*(part.attributes[name].dtype for part in parts if name in part.attributes))
+        of_each = (p.attributes.get(name, np.zeros(n, kind)) for p, n in zip(parts, counts, strict=True))
+        attributes[name] = np.concatenate([*of_each])
     sizes = [sum(map(len, part.faces)) for part in parts]
-    slots = [
-        np.zeros(n, np.int64) if part.slots is None else part.slots
-        for part, n in zip(parts, sizes, strict=True)
-    ]
+    slots = [np.full(n, 0 if p.slots is None else p.slots) for p, n in zip(parts, sizes, strict=True)]
     smooth = [np.full(n, part.smooth) for part, n in zip(parts, sizes, strict=True)]
-    empty = Skeleton(np.empty((0, 3)))
+    # An empty one first, whatever there is to join.
     return Skeleton(
-        np.concatenate([empty.vertices, *(part.vertices for part in parts)]),
-        np.concatenate([empty.edges, *(p.edges + start for p, start in zip(parts, starts, strict=True))]),
+        np.concatenate([np.empty((0, 3)), *(part.vertices for part in parts)]),
+        np.concatenate(
+            [np.empty((0, 2), np.int64), *(p.edges + n for p, n in zip(parts, starts, strict=True))]
+        ),
         tuple(f + start for p, start in zip(parts, starts, strict=True) for f in p.faces),
         attributes,
         np.concatenate([np.empty(0, np.int64), *slots]),
@@ -301,20 +295,12 @@ def _with_section(half: Skeleton, section: Floats) -> Skeleton:
     from mathutils.geometry import tessellate_polygon
 
     triangles = np.array(tessellate_polygon([[(r, z, 0.0) for r, z in section]]))
-    start = len(half.vertices)
-    sides = []
-    for number, sign in enumerate((1.0, -1.0)):
-        flat = np.column_stack([np.zeros(len(section)), sign * section[:, 0], section[:, 1]])
-        sides.append((flat, triangles + start + number * len(section)))
-    count = sum(len(f) for f in half.faces)
-    cuts = np.concatenate(
-        [_facing_x(np.concatenate([half.vertices, *(s[0] for s in sides)]), s[1]) for s in sides]
-    )
-    return Skeleton(
-        np.concatenate([half.vertices, *(s[0] for s in sides)]),
-        faces=(*half.faces, cuts),
-        slots=np.concatenate([np.zeros(count, np.int64), np.ones(len(cuts), np.int64)]),
-    )
+    r, z = section.T
+    sides = [np.column_stack([np.zeros_like(r), sign * r, z]) for sign in (1.0, -1.0)]
+    vertices, start = np.concatenate([half.vertices, *sides]), len(half.vertices)
+    cuts = _facing_x(vertices, np.concatenate([triangles + start, triangles + start + len(section)]))
+    slots = np.repeat([0, 1], [sum(map(len, half.faces)), len(cuts)])
+    return Skeleton(vertices, faces=(*half.faces, cuts), slots=slots)
 
 
 def _facing_x(vertices: Floats, triangles: Integers) -> Integers:

@@ -207,8 +207,7 @@ def _names(context: Any, root: Any, motion: Any, size: int) -> None:
             if base is not None:
                 y = name_height(y, base.y, below_headers(context.area, context.region) - 1.5 * size)
             text = motion_parts.owner(name) + (", print" if what == motion_parts.PRINT else "")
-            blf.size(0, size)
-            write(text, place.x - blf.dimensions(0, text)[0] / 2, y, size)
+            write(text, place.x, y, size, share=0.5)
 
 
 def name_height(above: float, base: float, limit: float) -> float:
@@ -244,9 +243,12 @@ def cross(x: float, y: float, side: float, colour: tuple[float, ...]) -> None:
     gpu.state.line_width_set(1.0)
 
 
-def write(text: str, x: float, y: float, size: int, colour: tuple[float, ...] = TEXT) -> None:
-    """Draw a text with a shadow, its lower left at x, y in pixels."""
+def write(
+    text: str, x: float, y: float, size: int, colour: tuple[float, ...] = TEXT, share: float = 0.0
+) -> None:
+    """Draw a text with a shadow, its lower edge at y in pixels, and a share of its width left of x."""
     blf.size(0, size)
+    x -= share * blf.dimensions(0, text)[0]
     blf.color(0, *colour)
     blf.enable(0, blf.SHADOW)
     blf.shadow(0, 5, 0.0, 0.0, 0.0, 1.0)

@@ -17,6 +17,7 @@ from bpy_extras.view3d_utils import location_3d_to_region_2d
 from mathutils import Matrix, Vector
 
 from ...design.dimensions import Dimensions
+from ...design.quantity import Description
 from ...errors import InputError
 from ..live_bending import state as live
 from ..results import motion as motion_parts
@@ -38,9 +39,8 @@ FINE = 0.1
 
 @attrs.frozen
 class Handle:
-    """An arrow of a parameter (or the pressure): place and direction in the unit's frame, gain, colour."""
+    """An arrow of a parameter of the chambers (or the pressure): place and way in the unit's frame, gain."""
 
-    section: str
     name: str
     stand: Callable[[Dimensions], tuple[tuple[float, float, float], tuple[float, float, float]]]
     gain: float
@@ -48,25 +48,15 @@ class Handle:
 
 
 HANDLES = {
-    "wall": Handle(
-        "chambers", "wall_mm", lambda d: ((0.0, d.R, 1.5 * d.cell), (0.0, 1.0, 0.0)), 1.0, (1.0, 0.55, 0.1)
-    ),
+    "wall": Handle("wall_mm", lambda d: ((0.0, d.R, 1.5 * d.cell), (0.0, 1.0, 0.0)), 1.0, (1.0, 0.55, 0.1)),
     "bladder": Handle(
-        "chambers",
-        "bladder_diameter_mm",
-        lambda d: ((0.0, -d.R, 0.5 * d.cell), (0.0, -1.0, 0.0)),
-        2.0,
-        (0.2, 0.75, 0.3),
+        "bladder_diameter_mm", lambda d: ((0.0, -d.R, 0.5 * d.cell), (0.0, -1.0, 0.0)), 2.0, (0.2, 0.75, 0.3)
     ),
     "cell": Handle(
-        "chambers",
-        "cell_mm",
-        lambda d: ((0.0, d.bounds[1][1], d.height), (0.0, 0.0, 1.0)),
-        0.0,
-        (0.25, 0.5, 1.0),
+        "cell_mm", lambda d: ((0.0, d.bounds[1][1], d.height), (0.0, 0.0, 1.0)), 0.0, (0.25, 0.5, 1.0)
     ),
     PRESSURE: Handle(
-        "", "", lambda d: ((0.0, 0.0, -d.inlet_length - d.cell), (0.0, 0.0, 1.0)), 1.0, (0.95, 0.3, 0.6)
+        "", lambda d: ((0.0, 0.0, -d.inlet_length - d.cell), (0.0, 0.0, 1.0)), 1.0, (0.95, 0.3, 0.6)
     ),
 }
 """A cell is one of `count` along the unit, by which its end moves: a gain of 0 denotes that."""
@@ -78,10 +68,14 @@ ITEMS = [
 ]
 
 
-def parameter_of(root: Any, handle: Handle) -> tuple[Any, str]:
+def described(name: str) -> Description:
+    """Description of the parameter that a handle drags."""
+    return description("chambers", HANDLES[name].name)
+
+
+def parameter_of(root: Any, name: str) -> tuple[Any, str]:
     """Group and name of the property that a handle drags."""
-    group = getattr(root.mu_unit, handle.section)
-    return group, field(group, description(handle.section, handle.name))
+    return root.mu_unit.chambers, field(root.mu_unit.chambers, described(name))
 
 
 def pressure_of(root: Any, scene: Any) -> float:
@@ -178,37 +172,34 @@ class MU_OT_drag(UnitPoll, bpy.types.Operator):
         if pixels.length < 1e-3:  # it points at the eye
             pixels = Vector((0.0, 1.0))
         if self.what == PRESSURE:
-            return pixels, (live.most_kPa(self._root) or _range_kPa(self._root)) / 300.0
-        description = self._described()
-        if description.high <= 20.0:
+            most = live.most_kPa(self._root)
+            return pixels, (most or float(np.ptp(motion_parts.motion_of(self._root).pressure_kPa))) / 300.0
+        if described(self.what).high <= 20.0:
             # A thin wall follows the mouse as its field in the panel does.
-            return pixels, step_of(description.high) / 100.0
+            return pixels, self._step()
         gain = HANDLES[self.what].gain or 1.0 / unit.dimensions.count
         return pixels, gain / pixels.length
 
-    def _described(self):
-        handle = HANDLES[self.what]
-        return description(handle.section, handle.name)
-
-    def _field(self):
-        return parameter_of(self._root, HANDLES[self.what])
-
     def _step(self) -> float:
-        return 0.5 if self.what == PRESSURE else step_of(self._described().high) / 100.0
+        return 0.5 if self.what == PRESSURE else step_of(described(self.what).high) / 100.0
 
     def _read(self, context) -> float:
-        return pressure_of(self._root, context.scene) if self.what == PRESSURE else getattr(*self._field())
+        if self.what == PRESSURE:
+            return pressure_of(self._root, context.scene)
+        return getattr(*parameter_of(self._root, self.what))
 
     def _write(self, context, value: float) -> None:
         if self.what == PRESSURE:
             to_pressure(self._root, context.scene, value)
         elif self._read(context) != value:
-            setattr(*self._field(), value)
+            setattr(*parameter_of(self._root, self.what), value)
 
     def _tell(self, context) -> None:
         value = self._read(context)
-        name = f"Pressure: {value:.1f} kPa" if self.what == PRESSURE else ""
-        words = name or f"{label(self._described())}: {value:.2f} mm"
+        if self.what == PRESSURE:
+            words = f"Pressure: {value:.1f} kPa"
+        else:
+            words = f"{label(described(self.what))}: {value:.2f} mm"
         trouble = self._root.mu_unit.trouble.partition("\n")[0]
         context.area.header_text_set(f"{words}   {trouble}".rstrip())
         viewports.redraw()
@@ -217,10 +208,6 @@ class MU_OT_drag(UnitPoll, bpy.types.Operator):
         context.area.header_text_set(None)
         viewports.redraw()
         return how
-
-
-def _range_kPa(root: Any) -> float:
-    return float(np.ptp(motion_parts.motion_of(root).pressure_kPa))
 
 
 def _place(root: Any, name: str, dimensions: Dimensions) -> tuple[Vector, Vector]:
@@ -293,7 +280,7 @@ class MU_WT_size(bpy.types.WorkSpaceTool):
         if root is None:
             layout.label(text="Select a Monolithic Unit", icon="INFO")
         elif chosen.what != PRESSURE:
-            layout.prop(*parameter_of(root, HANDLES[chosen.what]), text="")
+            layout.prop(*parameter_of(root, chosen.what), text="")
 
 
 @at_start

@@ -93,9 +93,9 @@ def _plot(context: Any, settings: Any, session: Session, traces: Any, scale: flo
     for title, curves, band in axes:
         top = bottom + HEIGHT * scale
         places = [k for k, _, _ in curves] + list(band or ())
-        before = session.ranges.get(title)
-        ends = _least(low[places]), _most(high[places])
-        session.ranges[title] = frame = steady_range(before, *ends)
+        known = np.isfinite(low[places]).any()
+        ends = (np.nanmin(low[places]), np.nanmax(high[places])) if known else (np.nan, np.nan)
+        session.ranges[title] = frame = steady_range(session.ranges.get(title), *map(float, ends))
         upward = (top - bottom) / (frame[1] - frame[0])
         low_y, high_y = (bottom + (values - frame[0]) * upward for values in (low, high))
         _paper((left, right), (bottom, top), frame, seconds, scale, title == axes[0][0])
@@ -105,20 +105,12 @@ def _plot(context: Any, settings: Any, session: Session, traces: Any, scale: flo
             _between("LINE_STRIP", x, low_y[k], high_y[k], runs, colour)
         at = left
         for k, name, colour in curves:
-            now = "" if len(age) == 0 else f" {(low[k, -1] + high[k, -1]) / 2:.4g}"
-            write(f"{name}{now}", at, top + 6 * scale, round(11 * scale), colour)
-            at += blf.dimensions(0, f"{name}{now}")[0] + 18 * scale
+            text = name if len(age) == 0 else f"{name} {(low[k, -1] + high[k, -1]) / 2:.4g}"
+            write(text, at, top + 6 * scale, round(11 * scale), colour)
+            at += blf.dimensions(0, text)[0] + 18 * scale
         bottom = top + GAP * scale
     if session.frozen is not None:
         write("plot frozen, recording continues", left, bottom + 4 * scale, round(11 * scale))
-
-
-def _least(values: Any) -> float:
-    return float(np.nanmin(values)) if np.isfinite(values).any() else np.nan
-
-
-def _most(values: Any) -> float:
-    return float(np.nanmax(values)) if np.isfinite(values).any() else np.nan
 
 
 def _paper(
@@ -137,16 +129,12 @@ def _paper(
     for value in ticks(*frame):
         y = bottom + (value - frame[0]) / (frame[1] - frame[0]) * (top - bottom)
         lines += [(left, y), (right, y)]
-        text = f"{value:.5g}"
-        blf.size(0, size)
-        write(text, left - 6 * s - blf.dimensions(0, text)[0], y - 0.35 * size, size)
+        write(f"{value:.5g}", left - 6 * s, y - 0.35 * size, size, share=1.0)
     for value in ticks(-seconds, 0.0):
         x = left + (1 + value / seconds) * (right - left)
         lines += [(x, bottom), (x, top)]
         if lowest:
-            text = f"{value:g} s"
-            blf.size(0, size)
-            write(text, x - blf.dimensions(0, text)[0] / 2, bottom - 1.3 * size, size)
+            write(f"{value:g} s", x, bottom - 1.3 * size, size, share=0.5)
     _shape("LINES", lines, GRID)
 
 
@@ -190,5 +178,4 @@ def _over_twin(context: Any, root: Any, scale: float) -> None:
     colour = WARNING if state == twin.OUTSIDE else TEXT
     size = round(12 * scale)
     for line, text in enumerate((words, title)):
-        blf.size(0, size)
-        write(text, place.x - blf.dimensions(0, text)[0] / 2, place.y + 1.5 * size * line, size, colour)
+        write(text, place.x, place.y + 1.5 * size * line, size, colour, share=0.5)

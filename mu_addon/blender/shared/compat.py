@@ -105,10 +105,3 @@ def set_curve(obj: Any, path: str, index: int, frames: Any, values: Any, constan
     kind = kinds["CONSTANT" if constant else "LINEAR"].value
     points.foreach_set("interpolation", np.full(len(frames), kind, np.int32))
     curves.find(path, index=max(index, 0)).update()
-
-
-def stored(obj: Any, group: str, name: str) -> Any:
-    """Value of a group's property stored in a file, whatever the group defines now, or None."""
-    kept = obj.bl_system_properties_get() if hasattr(obj, "bl_system_properties_get") else obj
-    found = kept.get(group) if kept is not None else None
-    return None if found is None else found.get(name)

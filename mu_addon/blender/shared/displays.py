@@ -100,6 +100,18 @@ def lock(obj: Any, location: bool = True) -> Any:
     return obj
 
 
+def remove_root(root: Any, *meshes: Any) -> None:
+    """Remove a unit or gripper with its displays and those of its meshes that nothing else uses."""
+    uuid, own = uuid_of(root), dict.fromkeys(mesh for mesh in (root.data, *meshes) if mesh is not None)
+    for child in root.children_recursive:
+        if child.get(OWNER) == uuid:
+            remove(child)
+    bpy.data.objects.remove(root)
+    for mesh in own:
+        if not mesh.users:
+            bpy.data.meshes.remove(mesh)
+
+
 def remove(obj: Any) -> None:
     """Remove a display and, if nothing else uses them, its data and its action."""
     data, action = obj.data, obj.animation_data.action if obj.animation_data else None

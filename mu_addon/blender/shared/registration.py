@@ -86,13 +86,22 @@ def made(cls: Any) -> None:
     _made.setdefault(cls.__module__, []).append(cls)
 
 
-def _declare(module: str, name: str, add: Callable[[], Any], remove: Callable[[], Any], rank: int = _CALLS):
-    _declared.setdefault(module, {})[name] = Hook(rank, add, remove)
+def _nothing() -> None:
+    pass
+
+
+def _declare(
+    of: Any, add: Callable[[], Any] = _nothing, remove: Callable[[], Any] = _nothing, what: str = ""
+) -> Any:
+    """Have something done with a function as it is registered and unregistered; return the function."""
+    _declared.setdefault(of.__module__, {})[f"{of.__qualname__} {what}"] = Hook(_CALLS, add, remove)
+    return of
 
 
 def attach(module: str, owner: Any, name: str, made: Callable[[], Any]) -> None:
     """Give a type of Blender's a property; made: makes it, at registration."""
-    _declare(module, name, lambda: setattr(owner, name, made()), lambda: delattr(owner, name), _PROPERTIES)
+    hook = Hook(_PROPERTIES, lambda: setattr(owner, name, made()), lambda: delattr(owner, name))
+    _declared.setdefault(module, {})[name] = hook
 
 
 def property_of(owner: Any, name: str) -> Callable[[type], type]:
@@ -116,10 +125,10 @@ def handler(*events: str) -> Callable[[Any], Any]:
         for event in events:
             listed = getattr(bpy.app.handlers, event)
             _declare(
-                function.__module__,
-                f"{function.__name__} {event}",
+                function,
                 lambda listed=listed: listed.append(function),
                 lambda listed=listed: function in listed and listed.remove(function),
+                event,
             )
         return function
 
@@ -129,33 +138,21 @@ def handler(*events: str) -> Callable[[Any], Any]:
 def connected(signal: Signal) -> Callable[[Any], Any]:
     """A function that a signal calls."""
 
-    def mark(function: Any) -> Any:
-        _declare(
-            function.__module__,
-            f"{function.__name__} signal",
-            lambda: signal.connect(function),
-            lambda: signal.disconnect(function),
-        )
-        return function
-
-    return mark
+    return lambda function: _declare(
+        function, lambda: signal.connect(function), lambda: signal.disconnect(function), "signal"
+    )
 
 
 def menu(name: str, first: bool = False) -> Callable[[Any], Any]:
     """A function that adds to what a menu, a header or a panel draws, at its end or first."""
 
-    def mark(function: Any) -> Any:
-        def add() -> None:
-            of = getattr(bpy.types, name)
-            (of.prepend if first else of.append)(function)
-
-        def remove() -> None:
-            getattr(bpy.types, name).remove(function)
-
-        _declare(function.__module__, f"{function.__qualname__} {name}", add, remove)
-        return function
-
-    return mark
+    how = "prepend" if first else "append"
+    return lambda function: _declare(
+        function,
+        lambda: getattr(getattr(bpy.types, name), how)(function),
+        lambda: getattr(bpy.types, name).remove(function),
+        name,
+    )
 
 
 def button(*places: str, icon: str = "NONE") -> Callable[[Any], Any]:
@@ -187,8 +184,7 @@ def overlay(function: Any) -> Any:
         while handles:
             bpy.types.SpaceView3D.draw_handler_remove(handles.pop(), "WINDOW")
 
-    _declare(function.__module__, function.__name__, add, remove)
-    return function
+    return _declare(function, add, remove)
 
 
 class Timer:
@@ -219,24 +215,17 @@ def timer(lasts: bool = False, after_s: float | None = None) -> Callable[[Any], 
 
     def mark(function: Any) -> Timer:
         made = Timer(function, lasts)
-        start = _nothing if after_s is None else lambda: made.soon(after_s)
-        _declare(function.__module__, function.__name__, start, made.cancel)
+        _declare(function, _nothing if after_s is None else lambda: made.soon(after_s), made.cancel)
         return made
 
     return mark
 
 
-def _nothing() -> None:
-    pass
-
-
 def at_start(function: Any) -> Any:
     """A function that is called when the extension is registered."""
-    _declare(function.__module__, function.__name__, function, _nothing)
-    return function
+    return _declare(function, function, what="start")
 
 
 def at_end(function: Any) -> Any:
     """A function that is called when it is unregistered."""
-    _declare(function.__module__, function.__name__, _nothing, function)
-    return function
+    return _declare(function, remove=function, what="end")

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection, Sequence
+from collections.abc import Collection
 
 from ...design.parameters import SECTIONS
 from ...design.quantity import Description, describe
@@ -72,7 +72,7 @@ class UnitPanel(RootPanel):
     def draw_header(self, context):
         """Draw a mark if one of the panel's parameters breaks a rule, also while it is closed."""
         root = self.find_root(context)
-        if self.place and root is not None and _blamed(root, _sections(self.place)):
+        if self.place and root is not None and _blamed(root, self.place):
             self.layout.label(text="", icon="ERROR")
 
     @classmethod
@@ -91,14 +91,10 @@ DONE, OUTDATED = "CHECKMARK", "FILE_REFRESH"
 """Marks of a part of the work that is done, and of one that was done before the unit changed."""
 
 
-def _sections(places: Collection[str]) -> list[str]:
-    """Sections whose parameters are shown at these places."""
-    return [s.section for s in SECTIONS if PLACES.get(s.section, "design") in places]
-
-
-def _blamed(root, sections: Collection[str]) -> bool:
-    """Return True if a parameter of these sections breaks a rule."""
+def _blamed(root, places: Collection[str]) -> bool:
+    """Return True if a parameter that is shown at one of these places breaks a rule."""
     found = broken(root)
+    sections = [s.section for s in SECTIONS if PLACES.get(s.section, "design") in places]
     return found is not None and found.blames(sections)
 
 
@@ -149,34 +145,22 @@ def parameters(layout, root, place: str) -> None:
                 elif shown is None or d.name in shown:
                     parameter(column, root, section.section, d)
     if folded:
-        _folded(layout, root, place, folded)
+        found = broken(root)
+        wrong = found is not None and any((section, d.name) in found.fits for section, d in folded)
+        if body := fold(layout, f"MU_more_{place}", "More", wrong):
+            column = body.column(align=True)
+            for section, d in folded:
+                parameter(column, root, section, d)
 
 
-def folded_place(layout, root, place: str, title: str) -> None:
-    """Draw a fold with the fields of every section that belongs to a place."""
-    body = fold(layout, f"MU_fold_{place}", title, _blamed(root, _sections([place])))
-    if body:
-        parameters(body, root, place)
+def folded_place(layout, root, place: str, title: str, hint: str = "", name: str = ""):
+    """Draw a fold with the fields of every section that belongs to a place; red while one breaks a rule.
 
-
-def folded_section(layout, root, section: str, title: str, hint: str):
-    """Draw a fold with a section that has a place of its own; its head is red while one of its fields is.
-
-    Returns the fold's layout, or None while it is closed.
+    Returns the fold's layout, or None while it is closed. name: by which Blender keeps it open.
     """
-    body = fold(layout, f"MU_{section}", title, _blamed(root, [section]))
+    body = fold(layout, name or f"MU_fold_{place}", title, _blamed(root, [place]))
     if body:
-        wrapped(body, hint, "INFO")
-        parameters(body, root, section)
+        if hint:
+            wrapped(body, hint, "INFO")
+        parameters(body, root, place)
     return body
-
-
-def _folded(layout, root, place: str, fields: Sequence[tuple[str, Description]]) -> None:
-    """Draw a fold with fields; its head is red while one of them breaks a rule."""
-    found = broken(root)
-    wrong = found is not None and any((section, d.name) in found.fits for section, d in fields)
-    body = fold(layout, f"MU_more_{place}", "More", wrong)
-    if body:
-        column = body.column(align=True)
-        for section, d in fields:
-            parameter(column, root, section, d)

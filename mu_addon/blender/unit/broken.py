@@ -9,7 +9,7 @@ from typing import Any
 import attrs
 
 from ...design.parameters import SECTIONS, Unit
-from ...design.quantity import Description, describe
+from ...design.quantity import describe
 from ...design.repairs import Repair, nearest_fit, repairs
 from ...errors import InputError, MuError
 from ..shared.blender_property import exact
@@ -17,10 +17,7 @@ from ..shared.wording import in_panel
 from .properties import section_of, to_unit
 
 Place = tuple[str, str]
-_KNOWN: dict[str, list[tuple[str, Description]]] = {}
-for _section in SECTIONS:
-    for _d in describe(_section):
-        _KNOWN.setdefault(_d.name, []).append((_section.section, _d))
+_PLACES = {(section.section, d.name) for section in SECTIONS for d in describe(section)}
 
 
 @attrs.frozen
@@ -60,11 +57,9 @@ def words(error: MuError) -> str:
 
 def _places(where: str) -> list[Place]:
     """Parameters named by the `where` of a rule: "[chambers] wall_mm"."""
-    section = re.match(r"\[(\w+)\] (.+)", where)
-    if section is None:
-        return []
-    names = [name.strip() for name in section[2].split(",")]
-    return [(section[1], name) for name in names if any(s == section[1] for s, _ in _KNOWN.get(name, ()))]
+    found = re.match(r"\[(\w+)\] (.+)", where)
+    named = [(found[1], name.strip()) for name in found[2].split(",")] if found else []
+    return [place for place in named if place in _PLACES]
 
 
 def broken(root: Any) -> Broken | None:

@@ -98,8 +98,7 @@ def set_sections(props, sections, core) -> None:
 
 def description(section: str, name: str) -> Description:
     """The core's description of a unit's parameter."""
-    (core,) = (s for s in SECTIONS if s.section == section)
-    return next(d for d in describe(core) if d.name == name)
+    return next(d for core in SECTIONS if core.section == section for d in describe(core) if d.name == name)
 
 
 @cache

@@ -40,11 +40,8 @@ def roots() -> list[Any]:
 
 def root_of(obj: Any) -> Any | None:
     """The unit that an object is or belongs to, or None."""
-    while obj is not None:
-        if obj.mu_unit.uuid:
-            return obj
-        obj = obj.parent
-    return None
+    found = displays.root_above(obj)
+    return found if found is not None and found.mu_unit.uuid else None
 
 
 def active_object(context: Any) -> Any | None:
@@ -54,19 +51,11 @@ def active_object(context: Any) -> Any | None:
 
 def active_root(context: Any) -> Any | None:
     """Unit to work on: that of the active object, or the only one if no gripper is active."""
-    obj = active_object(context)
-    found = root_of(obj)
-    if found is None and not _of_gripper(obj):
-        every = [o for o in context.scene.objects if o.mu_unit.uuid]
-        found = every[0] if len(every) == 1 else None
-    return found
-
-
-def _of_gripper(obj: Any | None) -> bool:
-    """Return True if an object is a gripper or a part of one."""
-    while obj is not None and not obj.mu_gripper.uuid:
-        obj = obj.parent
-    return obj is not None
+    found = displays.root_above(active_object(context))
+    if found is not None:
+        return found if found.mu_unit.uuid else None
+    every = [o for o in context.scene.objects if o.mu_unit.uuid]
+    return every[0] if len(every) == 1 else None
 
 
 def first_that(context: Any, shows: Any) -> Any | None:
@@ -105,6 +94,13 @@ def new_root(context: Any, title: str) -> Any:
     return root
 
 
+def take(root: Any, unit: Unit) -> bool:
+    """Give a unit other parameters; return as `rebuild` does."""
+    with updates.paused():
+        from_unit(root.mu_unit, unit)
+    return rebuild(root)
+
+
 def make_active(context: Any, obj: Any) -> None:
     """Select an object, alone, and make it the active one."""
     viewports.select(context, [obj], obj)
@@ -112,14 +108,7 @@ def make_active(context: Any, obj: Any) -> None:
 
 def delete(root: Any) -> None:
     """Remove a unit with its displays; the user's children are kept."""
-    meshes = [root.data, root.mu_unit.preview, root.mu_unit.solid, root.mu_unit.envelope]
-    for child in root.children_recursive:
-        if child.get(displays.OWNER) == root.mu_unit.uuid:
-            displays.remove(child)
-    bpy.data.objects.remove(root)
-    for mesh in dict.fromkeys(mesh for mesh in meshes if mesh is not None):
-        if not mesh.users:
-            bpy.data.meshes.remove(mesh)
+    displays.remove_root(root, root.mu_unit.preview, root.mu_unit.solid, root.mu_unit.envelope)
 
 
 def chosen_window(root: Any, unit: Unit) -> Window | None:

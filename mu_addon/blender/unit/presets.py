@@ -10,12 +10,11 @@ from bpy.props import StringProperty
 
 from ...design.parameters import Unit, load_preset, preset_names, read_unit, write_unit
 from ...errors import InputError, OutputError
-from ..shared import updates
 from ..shared.compat import user_folder
 from ..shared.operators import FreeOperator, operator
 from . import object as unit_object
 from .base_classes import UnitOperator
-from .properties import from_unit, to_unit
+from .properties import to_unit
 
 USER = "user:"
 
@@ -76,9 +75,7 @@ def preset_load(root, name):
     core = load(name)
     if not is_named_after_one(root.name):
         core = attrs.evolve(core, name=root.mu_unit.title)  # the user's own name stays
-    with updates.paused():
-        from_unit(root.mu_unit, core)
-    unit_object.rebuild(root)
+    unit_object.take(root, core)
 
 
 def _ask_name(operator, context, event):

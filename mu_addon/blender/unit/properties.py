@@ -21,6 +21,7 @@ from bpy.props import (
 
 from ...design.parameters import SECTIONS, Unit
 from ...design.quantity import Description, describe
+from ...errors import InputError
 from ...fem.device import DEVICE
 from ...meshing.settings import REFINE, SELF_CONTACT
 from ...simulate_and_place.settings import ALL_PATHS, ORIENTATION, PATHS, PROTOCOL, SELF_FRICTION
@@ -204,6 +205,14 @@ def to_unit(props) -> Unit:
 def shape_hash(unit: Unit) -> str:
     """Hash of a unit without its name, so that a new name makes no result stale."""
     return attrs.evolve(unit, name="unit").hash()
+
+
+def shape_now(props) -> str:
+    """That hash of a unit's present properties, "" where a rule is broken."""
+    try:
+        return shape_hash(to_unit(props))
+    except InputError:
+        return ""
 
 
 def from_unit(props, unit: Unit) -> None:

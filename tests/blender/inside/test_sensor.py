@@ -426,7 +426,7 @@ def test_what_is_drawn_does_not_grow_with_the_rate_and_stays_in_its_axes(tmp_pat
     monkeypatch.setattr(
         sensor_plot, "_shape", lambda kind, points, colour: shapes.append((kind, np.array(points), colour))
     )
-    monkeypatch.setattr(sensor_plot, "write", lambda text, x, y, size, *colour: texts.append(text))
+    monkeypatch.setattr(sensor_plot, "write", lambda text, *_, **__: texts.append(text))
     monkeypatch.setattr(sensor_plot, "blf", MagicMock(**{"dimensions.return_value": (40.0, 10.0)}))
     monkeypatch.setattr(sensor_plot, "room", lambda context, scale: (100.0, 900.0, 24.0))
 
