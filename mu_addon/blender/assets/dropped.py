@@ -5,17 +5,15 @@ Blender adds it to the scene, and the nearest unit gets it. No operator may be c
 so a timer then applies their parameters to the unit, in one undo step, and removes them.
 """
 
-# Blender reads the annotations themselves: no `from __future__ import annotations` here.
-
 from typing import Any
 
 import bpy
-from bpy.props import StringProperty
 
 from ...errors import InputError
 from ...reading import parse_json
 from ..preview import materials
 from ..shared import displays, restoring, viewports
+from ..shared.blender_property import Text
 from ..shared.operators import FreeOperator, linked, operator
 from ..shared.registration import handler, timer
 from ..unit import drawing, resins
@@ -28,8 +26,8 @@ RESIN, PRINTER = "mu_resin", "mu_printer"
 @operator(
     FreeOperator,
     "Use Dropped Asset",
-    unit=StringProperty(name="Unit", description="UUID of the unit", options={"HIDDEN"}),
-    asset=StringProperty(name="Asset", description="Name of the material or object", options={"HIDDEN"}),
+    unit=Text("Unit", "UUID of the unit", options={"HIDDEN"}),
+    asset=Text("Asset", "Name of the material or object", options={"HIDDEN"}),
 )
 def take_asset(operator, unit, asset):
     """Give a unit the resin or printer that was dropped on it"""

@@ -1,10 +1,7 @@
 """Presets and node groups in the user's asset browser, node groups on curves, and the sample scene."""
 
-# Blender reads the annotations themselves: no `from __future__ import annotations` here.
-
-from bpy.props import EnumProperty
-
 from ..preview import nodes
+from ..shared.blender_property import Choice
 from ..shared.operators import FreeOperator, RootOperator, operator
 from . import library
 from . import sample as sample_scenes
@@ -38,9 +35,9 @@ class _OnCurve(RootOperator):
 @operator(
     _OnCurve,
     "Skin with Nodes",
-    group=EnumProperty(
-        name="Group",
-        description="Node group to add as a modifier",
+    group=Choice(
+        "Group",
+        "Node group to add as a modifier",
         items=[(name, name, one.text) for name, one in nodes.GROUPS.items()],
     ),
 )
@@ -52,9 +49,9 @@ def skin(root, group):
 @operator(
     FreeOperator,
     "Sample Scene",
-    scene=EnumProperty(
-        name="Scene",
-        description="What is added",
+    scene=Choice(
+        "Scene",
+        "What is added",
         items=[(name, name.capitalize(), text) for name, (text, _) in sample_scenes.SCENES.items()],
     ),
 )

@@ -1,7 +1,5 @@
 """The user's own body: check it, make it the unit's envelope, remove it."""
 
-# Blender reads the annotations themselves: no `from __future__ import annotations` here.
-
 from ...design.body import require_sound
 from ...design.printing.repair import repaired
 from ...errors import InputError

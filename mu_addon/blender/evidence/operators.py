@@ -1,13 +1,10 @@
 """Diagnose measured data, show their motion, and apply the named effects to the unit."""
 
-# Blender reads the annotations themselves: no `from __future__ import annotations` here.
-
-from bpy.props import StringProperty
-
 from ...errors import InputError
 from ..jobs import start_child
 from ..jobs.operators import job_operators
 from ..shared import viewports
+from ..shared.blender_property import Text
 from ..shared.operators import operator, unless
 from ..simulate import effects
 from ..simulate import study_folder as studies
@@ -88,9 +85,7 @@ def evidence_remove(root):
 @operator(
     UnitOperator,
     "Show Measured Motion",
-    experiment=StringProperty(
-        name="Experiment", description="Name of an experiment of a unit under pressure; empty hides it"
-    ),
+    experiment=Text("Experiment", "Name of an experiment of a unit under pressure; empty hides it"),
 )
 def evidence_motion(context, root, experiment):
     """Show an experiment on the timeline next to the unit, measured and simulated; press again to hide it"""
@@ -104,9 +99,7 @@ def evidence_motion(context, root, experiment):
 @operator(
     UnitOperator,
     "Simulate These Pressures",
-    experiment=StringProperty(
-        name="Experiment", description="Name of an experiment of a unit under pressure"
-    ),
+    experiment=Text("Experiment", "Name of an experiment of a unit under pressure"),
 )
 def evidence_protocol(root, experiment):
     """Use an experiment's pressures for the unit's next simulation, so that both play in the same time"""

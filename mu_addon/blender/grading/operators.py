@@ -1,7 +1,5 @@
 """Paint factors on the struts' diameters, cell by cell, and apply them to the unit."""
 
-# Blender reads the annotations themselves: no `from __future__ import annotations` here.
-
 import bpy
 
 from ...errors import InputError

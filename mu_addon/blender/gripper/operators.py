@@ -1,15 +1,12 @@
 """Add a gripper, simulate its grasp in a child process, and play the grasp."""
 
-# Blender reads the annotations themselves: no `from __future__ import annotations` here.
-
 import attrs
-from bpy.props import BoolProperty, EnumProperty
 
 from ...design.anchors import farthest_window, windows
 from ...design.gripper import gripper_names, load_gripper
 from ..jobs.operators import job_operators
 from ..shared import landing, viewports
-from ..shared.blender_property import listed
+from ..shared.blender_property import Choice, Flag, listed
 from ..shared.operators import FreeOperator, RootOperator, operator
 from ..unit.object import active_root
 from ..unit.properties import to_unit
@@ -27,12 +24,10 @@ def _presets() -> list[tuple[str, str, str]]:
 @operator(
     FreeOperator,
     "Monolithic Gripper",
-    preset=EnumProperty(
-        name="Preset", description="Gripper to begin with", items=listed(_presets), options={"SKIP_SAVE"}
-    ),
-    of_unit=BoolProperty(
-        name="Of the Active Unit",
-        description="Its fingers are copies of the active unit, with its sensor path",
+    preset=Choice("Preset", "Gripper to begin with", items=listed(_presets), options={"SKIP_SAVE"}),
+    of_unit=Flag(
+        "Of the Active Unit",
+        "Its fingers are copies of the active unit, with its sensor path",
         options={"SKIP_SAVE"},
     ),
 )
@@ -70,9 +65,7 @@ def grasp(root):
     grasps.GRASPING.start(root)
 
 
-@operator(
-    GripperOperator, "Show Grasp", on=BoolProperty(name="Show", description="Show or hide it", default=True)
-)
+@operator(GripperOperator, "Show Grasp", on=Flag("Show", "Show or hide it", default=True))
 def grasp_show(context, root, on):
     """Play the grasp on the timeline, both fingers and the cube, or hide it"""
     if on:

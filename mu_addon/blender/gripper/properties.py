@@ -1,11 +1,9 @@
 """A gripper's parameters on its root object: generated from the core's, and the settings of its grasp."""
 
-# Blender reads the annotations themselves: no `from __future__ import annotations` here.
-
 from functools import lru_cache
 
 import bpy
-from bpy.props import BoolProperty, EnumProperty, FloatProperty, PointerProperty, StringProperty
+from bpy.props import PointerProperty, StringProperty
 
 from ...design import parameters
 from ...design.gripper import SECTIONS, Gripper
@@ -14,7 +12,16 @@ from ...design.settings import FRICTION
 from ...grasp.settings import DENSITY
 from ...meshing.settings import SELF_CONTACT
 from ..shared import displays
-from ..shared.blender_property import MILLIMETRES, blender_property, exact, millimetres, path_property
+from ..shared.blender_property import (
+    MILLIMETRES,
+    Choice,
+    Flag,
+    Number,
+    blender_property,
+    exact,
+    millimetres,
+    path_property,
+)
 from ..shared.registration import property_of
 from ..shared.updates import Signal
 from ..unit.fields import generated_group, path_menu, set_sections
@@ -62,14 +69,14 @@ class MU_PG_gripper(bpy.types.PropertyGroup):
             name: PointerProperty(type=group, description=group.__doc__ or name)
             for name, group in GROUPS.items()
         },
-        "cut": BoolProperty(
-            name="Cut Open",
-            description="Show the fingers cut in their bending plane, to see chambers and wall",
+        "cut": Flag(
+            "Cut Open",
+            "Show the fingers cut in their bending plane, to see chambers and wall",
             update=_changed,
         ),
-        "cube_mm": FloatProperty(
-            name="Cube",
-            description="Side of the grasped cube, in the middle between the tips",
+        "cube_mm": Number(
+            "Cube",
+            "Side of the grasped cube, in the middle between the tips",
             subtype=MILLIMETRES,
             default=25.0,
             min=1.0,
@@ -86,9 +93,9 @@ class MU_PG_gripper(bpy.types.PropertyGroup):
         ),
         "density_g_per_ml": blender_property(DENSITY, name="Density (g/ml)", precision=2),
         "friction": blender_property(FRICTION, precision=2),
-        "detail": EnumProperty(
-            name="Job",
-            description="What is done",
+        "detail": Choice(
+            "Job",
+            "What is done",
             items=[
                 ("quick", "Grasp, Quick Look", "A coarser mesh and longer steps"),
                 ("full", "Grasp", "The grasp on the default mesh"),

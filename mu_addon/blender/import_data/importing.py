@@ -13,6 +13,7 @@ from ...files import make_folder
 from ..jobs import prepared, start_child
 from ..jobs.here import run_here
 from ..shared import viewports
+from ..shared.blender_property import Text
 from ..shared.operators import choose_file, open_file, operator
 from ..shared.panels import wrapped
 from ..shared.registration import property_of
@@ -33,11 +34,8 @@ class MU_PG_import_answer(bpy.types.PropertyGroup):
     choices: StringProperty(options={"HIDDEN"})
     experiment: StringProperty(options={"HIDDEN"})
     answered: BoolProperty(options={"HIDDEN"})
-    value: StringProperty(
-        name="Answer",
-        description="Open questions of the file",
-        search=_offered,
-        search_options={"SORT", "SUGGESTION"},
+    value: Text(
+        "Answer", "Open questions of the file", search=_offered, search_options={"SORT", "SUGGESTION"}
     )
 
 

@@ -3,8 +3,8 @@
 # Blender reads the annotations themselves: no `from __future__ import annotations` here.
 
 import bpy
-from bpy.props import BoolProperty, EnumProperty, FloatProperty
 
+from ..shared.blender_property import Choice, Flag, Number
 from ..shared.registration import property_of
 from ..shared.updates import Signal
 
@@ -18,15 +18,15 @@ PLAIN = "plain"
 class MU_PG_live(bpy.types.PropertyGroup):
     """Bending of a unit while it is designed."""
 
-    on: BoolProperty(
-        name="Bend Live",
-        description="Bend the unit while it is designed: a coarse solution of the printed body after every "
+    on: Flag(
+        "Bend Live",
+        "Bend the unit while it is designed: a coarse solution of the printed body after every "
         "change, then finer ones. Without self-contact, and not while a simulation runs",
         update=lambda live, context: SWITCHED.send(live.id_data),
     )
-    pressure_kPa: FloatProperty(
-        name="Pressure (kPa)",
-        description="Pressure at which the unit is shown bent; suction is simulated only",
+    pressure_kPa: Number(
+        "Pressure (kPa)",
+        "Pressure at which the unit is shown bent; suction is simulated only",
         default=40.0,
         min=0.0,
         soft_max=40.0,
@@ -35,9 +35,9 @@ class MU_PG_live(bpy.types.PropertyGroup):
         precision=1,
         update=lambda live, context: PRESSED.send(live.id_data),
     )
-    colour: EnumProperty(
-        name="Colours",
-        description="Quantity shown by the colours of the bent unit",
+    colour: Choice(
+        "Colours",
+        "Quantity shown by the colours of the bent unit",
         items=[
             (PLAIN, "Plain", "The colours of the parts"),
             ("largest_stretch", "Stretch", "Largest principal stretch"),

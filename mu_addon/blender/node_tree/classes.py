@@ -6,13 +6,13 @@ A node added to the core appears with its sockets, fields, bounds and tooltips w
 # Blender reads the annotations themselves: no `from __future__ import annotations` here.
 
 import bpy
-from bpy.props import BoolProperty, PointerProperty, StringProperty
+from bpy.props import PointerProperty, StringProperty
 
 from ...graph.definition import FOLDER, Definition, Setting
 from ...graph.evaluation import BLOCKED, CACHED, COMPUTED, FAILED, MADE, MUTED, WAITING
 from ...nodes.definitions import definitions
 from ...run.progress import spell
-from ..shared.blender_property import blender_property, path_property
+from ..shared.blender_property import Flag, blender_property, path_property
 from ..shared.panels import wrapped
 from ..shared.updates import Signal
 from ..shared.wording import label, sentence, tooltip
@@ -79,9 +79,7 @@ class MuNodeTree(bpy.types.NodeTree):
         "Folder of this tree's runs. Empty: beside the .blend file, or the user's folder",
         folder=True,
     )
-    mu_reports: BoolProperty(
-        name="Reports of All Runs", description="Write the full report of every run within the tree, too"
-    )
+    mu_reports: Flag("Reports of All Runs", "Write the full report of every run within the tree, too")
 
     @classmethod
     def valid_socket_type(cls, socket_type):

@@ -1,11 +1,9 @@
 """Groups: several nodes as one, edited in a separate tree, used in any number of places."""
 
-# Blender reads the annotations themselves: no `from __future__ import annotations` here.
-
 import bpy
-from bpy.props import StringProperty
 
 from ...errors import InputError
+from ..shared.blender_property import Text
 from ..shared.operators import operator
 from ..shared.registration import at_end, at_start
 from ..unit.base_classes import UnitOperator
@@ -145,7 +143,7 @@ def node_group_ungroup(tree):
     TreeOperator,
     "Edit Group",
     undo=False,
-    node=StringProperty(name="Node", description="Name of the group's node; empty: the active one"),
+    node=Text("Node", "Name of the group's node; empty: the active one"),
 )
 def node_group_edit(context, tree, node):
     """Open a group to edit it, or go back to the tree that it is used in"""

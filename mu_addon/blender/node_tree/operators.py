@@ -1,11 +1,9 @@
 """Operators of node trees: evaluate, stop, open results, templates, files, units of the scene."""
 
-# Blender reads the annotations themselves: no `from __future__ import annotations` here.
-
 from pathlib import Path
 
 import bpy
-from bpy.props import BoolProperty, EnumProperty, StringProperty
+from bpy.props import StringProperty
 
 from ...errors import InputError
 from ...files import write_text
@@ -15,7 +13,7 @@ from ...nodes import templates
 from ...nodes.definitions import definitions
 from ..jobs import start_child
 from ..jobs.operators import job_operators
-from ..shared.blender_property import listed
+from ..shared.blender_property import Choice, Flag, Text, listed
 from ..shared.operators import FreeOperator, choose_file, open_file, operator
 from ..shared.wording import sentence
 from ..unit.base_classes import UnitOperator
@@ -70,7 +68,7 @@ def _tree_evaluate_trouble(tree):
     "Evaluate",
     undo=False,
     trouble=_tree_evaluate_trouble,
-    node=StringProperty(name="Node", description="Evaluate this node and its sources; empty: all"),
+    node=Text("Node", "Evaluate this node and its sources; empty: all"),
 )
 def tree_evaluate(context, tree, node):
     """Evaluate the tree in a separate process; finished nodes are not repeated, and Blender stays usable"""
@@ -88,11 +86,7 @@ def _templates() -> list[tuple[str, str, str]]:
 @operator(
     FreeOperator,
     "New from Template",
-    template=EnumProperty(
-        name="Template",
-        description="Initial nodes of the tree",
-        items=listed(_templates),
-    ),
+    template=Choice("Template", "Initial nodes of the tree", items=listed(_templates)),
 )
 def tree_new(context, template):
     """Add a node tree made from a template"""
@@ -106,7 +100,7 @@ _FILTER = StringProperty(default="*.toml", options={"HIDDEN"})
     FreeOperator,
     "Open Tree File",
     invoke=choose_file,
-    filepath=StringProperty(name="File", description="TOML file of a node tree", subtype="FILE_PATH"),
+    filepath=Text("File", "TOML file of a node tree", subtype="FILE_PATH"),
     filter_glob=_FILTER,
 )
 def tree_load(context, filepath):
@@ -125,7 +119,7 @@ def _choose_target(operator, context, event):
     "Save Tree File",
     undo=False,
     invoke=_choose_target,
-    filepath=StringProperty(name="File", description="TOML file to write", subtype="FILE_PATH"),
+    filepath=Text("File", "TOML file to write", subtype="FILE_PATH"),
     filter_glob=_FILTER,
 )
 def tree_save(operator, tree, filepath):
@@ -142,9 +136,7 @@ def tree_save(operator, tree, filepath):
     UnitOperator,
     "Tree of the Active Unit",
     linked_too=True,
-    steps=BoolProperty(
-        name="Steps", description="Lay out the steps of its design, and have the unit follow them"
-    ),
+    steps=Flag("Steps", "Lay out the steps of its design, and have the unit follow them"),
 )
 def tree_of_unit(context, root, steps):
     """Add a tree with the active unit: its sidebar and the tree's node show the same fields"""
@@ -159,9 +151,7 @@ def tree_show(context, root):
     node = following.followed(root)
     if node is None:
         raise InputError(
-            "the unit follows no tree",
-            root.name,
-            "use Tree of the Active Unit in a node editor, with Steps",
+            "the unit follows no tree", root.name, "use Tree of the Active Unit in a node editor, with Steps"
         )
     tree = node.id_data
     tree.nodes.active = node
@@ -185,9 +175,9 @@ def _node_editor(context):
     _TreeOperator,
     "Open",
     undo=False,
-    what=EnumProperty(
-        name="What",
-        description="What to open",
+    what=Choice(
+        "What",
+        "What to open",
         items=[
             ("folder", "Folder", "Folder of the node's run"),
             ("report", "Report", "Report of the node's run, where it was written"),

@@ -1,10 +1,7 @@
 """Obstacles of a unit: make selected meshes obstacles, add a box, check them, remove them."""
 
-# Blender reads the annotations themselves: no `from __future__ import annotations` here.
-
 import bpy
 import numpy as np
-from bpy.props import FloatProperty, FloatVectorProperty, StringProperty
 from mathutils import Vector
 
 from ...design.body import require_sound
@@ -14,7 +11,7 @@ from ...errors import InputError
 from ..body.operators import report_flaws, selected_meshes
 from ..preview import materials, skeletons
 from ..shared import viewports
-from ..shared.blender_property import blender_property, exact
+from ..shared.blender_property import Number, Numbers, Text, blender_property, exact
 from ..shared.operators import operator, unless
 from ..unit.base_classes import UnitOperator, ValidUnitOperator
 from ..unit.properties import to_unit
@@ -23,9 +20,7 @@ from . import state as obstacles
 NO_OBSTACLE = "No obstacle yet: select a closed mesh and use it as one"
 
 
-_NAME = StringProperty(
-    name="Obstacle", description="Name of its object. Empty: all of this unit", options={"SKIP_SAVE"}
-)
+_NAME = Text("Obstacle", "Name of its object. Empty: all of this unit", options={"SKIP_SAVE"})
 
 
 class _OfObstacles(UnitOperator):
@@ -61,16 +56,8 @@ def obstacle(operator, context, root, friction):
 @operator(
     ValidUnitOperator,
     "Add Box",
-    size=FloatVectorProperty(
-        name="Size (mm)",
-        description="Edges of the box in mm",
-        subtype="XYZ",
-        default=(25.0, 25.0, 25.0),
-        min=0.1,
-    ),
-    gap=FloatProperty(
-        name="Gap (mm)", description="Distance between unit and box in mm", default=5.0, min=0.0
-    ),
+    size=Numbers("Size (mm)", "Edges of the box in mm", subtype="XYZ", default=(25.0, 25.0, 25.0), min=0.1),
+    gap=Number("Gap (mm)", "Distance between unit and box in mm", default=5.0, min=0.0),
     friction=blender_property(FRICTION, precision=2),
 )
 def obstacle_box(context, root, size, gap, friction):

@@ -11,14 +11,13 @@ from typing import Any
 
 import attrs
 import bpy
-from bpy.props import FloatProperty, StringProperty
 
 from ...design.body import Body, Flaw, flaws, overlaps, require_sound
 from ...design.parameters import Unit
 from ...design.rigid_body import RigidBody
 from ...design.settings import FRICTION
 from ..body import state as bodies
-from ..shared.blender_property import blender_property, exact
+from ..shared.blender_property import Number, Text, blender_property, exact
 from ..shared.registration import at_end, handler, property_of
 from ..unit import envelope
 
@@ -30,10 +29,10 @@ ODD_SIZE_MM = (0.1, 2000.0)
 class MU_PG_obstacle(bpy.types.PropertyGroup):
     """An object as an obstacle of a unit."""
 
-    unit: StringProperty(name="Unit", description="UUID of the unit that may touch it", options={"HIDDEN"})
-    mm: FloatProperty(
-        name="Millimetre",
-        description="Length of a millimetre in the scene that the object's size is right for; 0: not known",
+    unit: Text("Unit", "UUID of the unit that may touch it", options={"HIDDEN"})
+    mm: Number(
+        "Millimetre",
+        "Length of a millimetre in the scene that the object's size is right for; 0: not known",
         options={"HIDDEN"},
     )
     friction: blender_property(FRICTION, soft_max=1.0, precision=2, step=5)

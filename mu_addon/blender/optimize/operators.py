@@ -1,22 +1,20 @@
 """List targets and freedoms, start the search, and take a proposed unit into the scene."""
 
-# Blender reads the annotations themselves: no `from __future__ import annotations` here.
-
 import attrs
-from bpy.props import EnumProperty, IntProperty
 
 from ...errors import InputError
 from ..jobs.operators import job_operators
 from ..shared import landing
+from ..shared.blender_property import Choice, Count
 from ..shared.operators import operator, unless
 from ..unit import object as unit_object
 from ..unit.base_classes import UnitOperator, ValidUnitOperator
 from . import state as optimization
 
 LONGEST_TITLE = 80
-_LIST = EnumProperty(
-    name="List",
-    description="Which list",
+_LIST = Choice(
+    "List",
+    "Which list",
     items=[("targets", "Targets", "Targets of the unit"), ("freedoms", "Freedoms", "What may change")],
 )
 
@@ -42,12 +40,7 @@ FIRST = (
 """Order in which the list proposes parameters: those with most effect on a unit's angle come first."""
 
 
-@operator(
-    UnitOperator,
-    "Remove from List",
-    what=_LIST,
-    index=IntProperty(name="Row", description="Row of the list, from 0", min=0),
-)
+@operator(UnitOperator, "Remove from List", what=_LIST, index=Count("Row", "Row of the list, from 0", min=0))
 def optimize_unlist(root, what, index):
     """Remove a target, or a parameter that may change, from the unit's list"""
     rows = getattr(root.mu_optimize, what)
@@ -68,7 +61,7 @@ class _OfProposed(UnitOperator):
     trouble = unless(optimization.proposed, "No unit is proposed: run the optimisation first")
 
 
-_NUMBER = IntProperty(name="Proposed Unit", description="Number of the proposed unit", default=1, min=1)
+_NUMBER = Count("Proposed Unit", "Number of the proposed unit", default=1, min=1)
 
 
 @operator(_OfProposed, "Apply", number=_NUMBER)

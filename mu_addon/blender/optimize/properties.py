@@ -3,14 +3,7 @@
 # Blender reads the annotations themselves: no `from __future__ import annotations` here.
 
 import bpy
-from bpy.props import (
-    BoolProperty,
-    CollectionProperty,
-    EnumProperty,
-    FloatProperty,
-    FloatVectorProperty,
-    StringProperty,
-)
+from bpy.props import CollectionProperty, StringProperty
 
 from ...design import lattice_kinds
 from ...design.anchors import windows
@@ -22,7 +15,16 @@ from ...optimization.freedoms import PATH, RESIN, parameters
 from ...optimization.settings import CHECK_REFINE, EVALUATIONS, ROBUST, SELF_CONTACT
 from ...optimization.settings import REFINE as SEARCH_REFINE
 from ...optimization.target_kinds import GAP, KINDS, PRESSURE
-from ..shared.blender_property import blender_property, exact, path_property
+from ..shared.blender_property import (
+    Choice,
+    Flag,
+    Number,
+    Numbers,
+    Text,
+    blender_property,
+    exact,
+    path_property,
+)
 from ..shared.registration import property_of
 from ..shared.wording import label, sentence
 from ..unit.fields import path_menu, true_scale
@@ -51,21 +53,21 @@ ASKED |= {"curve": ("points", "tolerance"), "minimise": (), "maximise": ()}
 
 
 def _number(name: str, description: str, default: float, **more):
-    return FloatProperty(name=name, description=description, default=default, precision=3, **more)
+    return Number(name, description, default=default, precision=3, **more)
 
 
 class MU_PG_target(bpy.types.PropertyGroup):
     """One target of a design: a quantity and its goal."""
 
-    kind: EnumProperty(
-        name="Quantity",
-        description="Quantity of the target",
+    kind: Choice(
+        "Quantity",
+        "Quantity of the target",
         items=[(name, name.replace("_", " ").title(), sentence(kind.text)) for name, kind in KINDS.items()],
     )
     pressure_kPa: blender_property(PRESSURE, name="At (kPa)", precision=1, step=100)
-    pressures_kPa: FloatVectorProperty(
-        name="At (kPa)",
-        description="Two gauge pressures over which it is taken",
+    pressures_kPa: Numbers(
+        "At (kPa)",
+        "Two gauge pressures over which it is taken",
         size=2,
         default=(-15.0, 30.0),
         min=PRESSURE.low,
@@ -73,25 +75,21 @@ class MU_PG_target(bpy.types.PropertyGroup):
         precision=1,
         step=100,
     )
-    direction: EnumProperty(
-        name="Along", description="Direction of the force", items=[(axis, axis.upper(), "") for axis in "xyz"]
-    )
-    toward: EnumProperty(
-        name="Along",
-        description="Direction of the displacement",
+    direction: Choice("Along", "Direction of the force", items=[(axis, axis.upper(), "") for axis in "xyz"])
+    toward: Choice(
+        "Along",
+        "Direction of the displacement",
         items=[("y", "Y", "Toward which the unit bends"), ("z", "Z", "Along the axis")],
     )
     gap_mm: blender_property(GAP, precision=2)
-    points: StringProperty(
-        name="Curve",
-        description="Pressure in kPa and value of each point, as -15: -10, 30: 16",
-        default="-15: -10, 30: 16",
+    points: Text(
+        "Curve", "Pressure in kPa and value of each point, as -15: -10, 30: 16", default="-15: -10, 30: 16"
     )
     path: StringProperty(default="alpha4", options={"HIDDEN"})
     paths: path_menu(lambda target: target.id_data.mu_unit.chambers.count, "The One Searched For")
-    ask: EnumProperty(
-        name="Shall Be",
-        description="Goal of the quantity",
+    ask: Choice(
+        "Shall Be",
+        "Goal of the quantity",
         items=[
             ("low", "At Least", "Not less than a bound"),
             ("high", "At Most", "Not more than a bound"),
@@ -180,9 +178,7 @@ def _true(name: str, title: str):
         setattr(freedom, name, value / scale_of(freedom))
 
     words = f"{title}, at the unit's scale"
-    return FloatProperty(
-        name=title, description=words, get=read, set=write, precision=3, options={"SKIP_SAVE"}
-    )
+    return Number(title, words, get=read, set=write, precision=3, options={"SKIP_SAVE"})
 
 
 def _scaled(values: str, factor: float, digits: int) -> str:
@@ -208,33 +204,31 @@ def _true_values():
         freedom.values = _scaled(values, 1.0 / scale_of(freedom), 15)
 
     words = "The values, at the unit's scale, as 0.7, 0.9, 1.1"
-    return StringProperty(name="Values", description=words, get=read, set=write, options={"SKIP_SAVE"})
+    return Text("Values", words, get=read, set=write, options={"SKIP_SAVE"})
 
 
 class MU_PG_freedom(bpy.types.PropertyGroup):
     """One parameter that may change, and its range."""
 
-    parameter: EnumProperty(
-        name="Parameter",
-        description="What may change",
+    parameter: Choice(
+        "Parameter",
+        "What may change",
         items=[(name, title(name, d), sentence(d.text)) for name, d in FREE.items()]
         + [(name, *words) for name, words in NAMED.items()],
         default="chambers.wall_mm",
         update=_first_range,
     )
-    how: EnumProperty(
-        name="May Be",
-        description="How the parameter may change",
+    how: Choice(
+        "May Be",
+        "How the parameter may change",
         items=[
             ("range", "Between", "Any value between two bounds"),
             ("values", "One of", "One of some values"),
             ("fixed", "Fixed at", "One value, which the search keeps"),
         ],
     )
-    values: StringProperty(
-        name="Values",
-        description="The values, in the parameter's unit at scale 1, as 0.7, 0.9, 1.1; or the names",
-        default="",
+    values: Text(
+        "Values", "The values, in the parameter's unit at scale 1, as 0.7, 0.9, 1.1; or the names", default=""
     )
     value: _number("Value", "In the parameter's unit at scale 1", 0.9)
     low: _number("From", "Lowest value, in the parameter's unit at scale 1", 0.7)
@@ -249,28 +243,26 @@ class MU_PG_freedom(bpy.types.PropertyGroup):
 class MU_PG_optimize(bpy.types.PropertyGroup):
     """Targets and freedoms of a unit, and settings of the search."""
 
-    source: EnumProperty(
-        name="Targets",
-        description="Where targets and freedoms are given",
+    source: Choice(
+        "Targets",
+        "Where targets and freedoms are given",
         items=[
             ("panel", "Listed Here", "Targets and freedoms of the lists below"),
             ("file", "In a File", "Those of a design.toml"),
         ],
     )
     file: path_property("File", "design.toml with targets and freedoms")
-    own_unit: BoolProperty(
-        name="Start from This Unit",
-        description="The search starts from this unit in place of the one that the file names",
+    own_unit: Flag(
+        "Start from This Unit",
+        "The search starts from this unit in place of the one that the file names",
         default=True,
     )
     targets: CollectionProperty(type=MU_PG_target, description="Targets of the unit")
     freedoms: CollectionProperty(type=MU_PG_freedom, description="What may change")
     robust: blender_property(ROBUST)
     self_contact: blender_property(SELF_CONTACT, name="Self-Contact")
-    has_gravity: BoolProperty(
-        name="Own Weight",
-        description="The unit carries its weight; then an angle at 0 kPa can be a target",
-        default=False,
+    has_gravity: Flag(
+        "Own Weight", "The unit carries its weight; then an angle at 0 kPa can be a target", default=False
     )
     # Horizontal, where weight matters most.
     orientation_deg: blender_property(

@@ -5,8 +5,6 @@ each other. A click on one chooses it. In the sidebar's list Blender tells what 
 shows a tooltip.
 """
 
-# Blender reads the annotations themselves: no `from __future__ import annotations` here.
-
 from contextlib import suppress
 from typing import Any
 

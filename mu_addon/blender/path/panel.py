@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 import bpy
-from bpy.props import EnumProperty
 
 from ...design.anchors import windows
+from ..shared.blender_property import Choice
 from ..shared.panels import plain_row
 from ..shared.registration import attach
 from ..shared.wording import anchors_of, path_symbol
@@ -25,9 +25,7 @@ attach(
     __name__,
     bpy.types.WindowManager,
     "mu_path_order",
-    lambda: EnumProperty(
-        name="Order", description="Order of the list of paths", items=ORDERS, default="deviation"
-    ),
+    lambda: Choice("Order", "Order of the list of paths", items=ORDERS, default="deviation"),
 )  # no file keeps it
 
 

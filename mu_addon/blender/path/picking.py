@@ -4,15 +4,13 @@ Blender reports a selection by an update of its dependency graph, in which no op
 timer makes the choice a moment later.
 """
 
-# Blender reads the annotations themselves: no `from __future__ import annotations` here.
-
 from typing import Any
 
 import bpy
-from bpy.props import StringProperty
 
 from ...design.anchors import window
 from ..shared import restoring, updates, viewports
+from ..shared.blender_property import Text
 from ..shared.displays import PART
 from ..shared.operators import operator
 from ..shared.registration import RESTORED, handler, timer
@@ -35,9 +33,9 @@ def _point_out(context, properties) -> str:
     UnitOperator,
     "Choose Sensor Path",
     tip=_point_out,
-    name=StringProperty(
-        name="Path",
-        description="Name of a path, alpha1 ..; `none` removes the waveguide, "
+    name=Text(
+        "Path",
+        "Name of a path, alpha1 ..; `none` removes the waveguide, "
         "nothing takes the candidate that is selected in the viewport",
     ),
 )

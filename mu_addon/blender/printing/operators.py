@@ -1,13 +1,10 @@
 """Check a unit for the printer, look at the findings, and write its files and specimens."""
 
-# Blender reads the annotations themselves: no `from __future__ import annotations` here.
-
-from bpy.props import BoolProperty, FloatVectorProperty, IntProperty
-
 from ...design.settings import UP
 from ...errors import InputError
 from ..jobs.operators import FILES, RUN_FILES, job_operators
 from ..shared import viewports
+from ..shared.blender_property import Count, Flag, Numbers
 from ..shared.operators import operator, unless
 from ..unit import object as unit_object
 from ..unit.base_classes import UnitOperator, ValidUnitOperator
@@ -66,11 +63,7 @@ def _path_of(root, what):
     return printing.latest_folder(root) / FILES[what]
 
 
-FOLDERS = {
-    "check-file": printing.FILE_CHECK,
-    "export": printing.EXPORT,
-    "specimens": printing.SPECIMENS,
-}
+FOLDERS = {"check-file": printing.FILE_CHECK, "export": printing.EXPORT, "specimens": printing.SPECIMENS}
 """Jobs whose folders can be opened."""
 
 
@@ -100,19 +93,15 @@ def print_clear(root):
 @operator(
     _OfCheck,
     "Show Finding",
-    finding=IntProperty(
-        name="Finding", description="Its number in the list, from 0", min=0, options={"SKIP_SAVE"}
-    ),
-    place=IntProperty(
-        name="Place",
-        description="Number of the place, from 0; -1: the one after that shown",
+    finding=Count("Finding", "Its number in the list, from 0", min=0, options={"SKIP_SAVE"}),
+    place=Count(
+        "Place",
+        "Number of the place, from 0; -1: the one after that shown",
         default=-1,
         min=-1,
         options={"SKIP_SAVE"},
     ),
-    view=BoolProperty(
-        name="Turn the View", description="Turn the 3D views to it", default=True, options={"SKIP_SAVE"}
-    ),
+    view=Flag("Turn the View", "Turn the 3D views to it", default=True, options={"SKIP_SAVE"}),
 )
 def print_show(context, root, finding, place, view):
     """Turn the view to a location of this finding; click again for the next one"""
@@ -140,12 +129,8 @@ def print_show(context, root, finding, place, view):
 @operator(
     UnitOperator,
     "Use Direction",
-    direction=FloatVectorProperty(
-        name="Up",
-        description="Away from the platform, in the unit's frame",
-        subtype="XYZ",
-        default=UP,
-        options={"SKIP_SAVE"},
+    direction=Numbers(
+        "Up", "Away from the platform, in the unit's frame", subtype="XYZ", default=UP, options={"SKIP_SAVE"}
     ),
 )
 def print_up(root, direction):

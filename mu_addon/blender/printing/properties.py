@@ -3,17 +3,11 @@
 # Blender reads the annotations themselves: no `from __future__ import annotations` here.
 
 import bpy
-from bpy.props import (
-    BoolProperty,
-    EnumProperty,
-    FloatProperty,
-    FloatVectorProperty,
-    IntProperty,
-)
+from bpy.props import IntProperty
 
 from ...design.assets import asset_names
 from ...design.settings import FINE, PRINTER, UP
-from ..shared.blender_property import blender_property, path_property
+from ..shared.blender_property import Choice, Flag, Number, Numbers, blender_property, path_property
 from ..shared.registration import property_of
 from . import layer, marks
 
@@ -32,9 +26,9 @@ FORMATS = (
 class MU_PG_print(bpy.types.PropertyGroup):
     """Print settings of a unit, and the files to write."""
 
-    printer: EnumProperty(
-        name="Printer",
-        description="Whose limits the check compares with",
+    printer: Choice(
+        "Printer",
+        "Whose limits the check compares with",
         items=[
             *(
                 (name, name.replace("-", " ").title(), "Included in the extension")
@@ -52,16 +46,16 @@ class MU_PG_print(bpy.types.PropertyGroup):
     limits_file: path_property(
         "Measured", "limits.csv of the specimens, filled in: limits that were measured on printed parts"
     )
-    up: FloatVectorProperty(
-        name="Up",
-        description="Build direction in the unit's frame, away from the platform. 0 0 1: inlet down",
+    up: Numbers(
+        "Up",
+        "Build direction in the unit's frame, away from the platform. 0 0 1: inlet down",
         subtype="XYZ",
         default=UP,
         update=lambda settings, context: layer.follow(settings.id_data),
     )
-    formats: EnumProperty(
-        name="Files",
-        description="Formats of an export; each file is read back and compared",
+    formats: Choice(
+        "Files",
+        "Formats of an export; each file is read back and compared",
         items=[(*item, 1 << number) for number, item in enumerate(FORMATS)],
         options={"ENUM_FLAG"},
         default={"stl", "3mf"},
@@ -74,9 +68,9 @@ class MU_PG_print(bpy.types.PropertyGroup):
             ("interactive", "Coarse", "Quicker, smaller files"),
         ],
     )
-    compensate: EnumProperty(
-        name="Compensate",
-        description="Subtract the print offset from the nominal geometry",
+    compensate: Choice(
+        "Compensate",
+        "Subtract the print offset from the nominal geometry",
         items=[
             ("none", "Nothing", "Nominal geometry"),
             ("unit", "Print Offsets", "The offsets of this unit, see Print Offsets"),
@@ -84,35 +78,34 @@ class MU_PG_print(bpy.types.PropertyGroup):
         ],
     )
     gauge: path_property("Sheet", "gauge.csv of the specimens with the sizes that were measured")
-    vents: BoolProperty(
-        name="Vents",
-        description="Vent the cups that trap resin if the unit is built along Up: STL and 3MF get a hole "
+    vents: Flag(
+        "Vents",
+        "Vent the cups that trap resin if the unit is built along Up: STL and 3MF get a hole "
         "through the wall for each cup of the print check; plug-1.stl .. close the holes",
     )
     stl_file: path_property(
         "File", "STL file to check, with the printer, the measured limits and Up as above"
     )
-    repair: BoolProperty(
-        name="Repair",
-        description="Repair the file before the check, where only one remedy is possible: flipped and "
+    repair: Flag(
+        "Repair",
+        "Repair the file before the check, where only one remedy is possible: flipped and "
         "doubled faces, tiny gaps. part.stl is then the repaired part; faults with more than one remedy "
         "are refused",
     )
-    against_unit: BoolProperty(
-        name="Compare",
-        description="Compare the file with this unit's nominal geometry: size, inlet, volume and tunnels",
+    against_unit: Flag(
+        "Compare", "Compare the file with this unit's nominal geometry: size, inlet, volume and tunnels"
     )
-    marker: FloatProperty(
-        name="Marks (mm)",
-        description="Radius in mm of the balls at the places that were found",
+    marker: Number(
+        "Marks (mm)",
+        "Radius in mm of the balls at the places that were found",
         default=0.8,
         min=0.05,
         max=10.0,
         update=lambda settings, context: marks.resize(settings.id_data),
     )
-    layer: FloatProperty(
-        name="Height",
-        description="Layer that is shown, as a share of the height, from the platform",
+    layer: Number(
+        "Height",
+        "Layer that is shown, as a share of the height, from the platform",
         default=0.5,
         min=0.0,
         max=1.0,

@@ -5,13 +5,13 @@
 from pathlib import Path
 
 import bpy
-from bpy.props import BoolProperty, StringProperty
+from bpy.props import StringProperty
 from bpy_extras.io_utils import ExportHelper
 
 from ...design.settings import FINE, QUALITY
 from ...design.solid import QUALITY as FACETS
 from ...design.stl_and_nodes import write_nodes, write_stl
-from ..shared.blender_property import blender_property
+from ..shared.blender_property import Flag, blender_property
 from ..shared.operators import operator
 from ..unit import object as unit_object
 from ..unit.base_classes import ValidUnitOperator
@@ -46,10 +46,8 @@ class MU_OT_export_stl(ValidUnitOperator, bpy.types.Operator, ExportHelper):
     filename_ext = ".stl"
     filter_glob: StringProperty(default="*.stl", options={"HIDDEN"})
     quality: blender_property(FINE, items=_ITEMS)
-    nodes: BoolProperty(
-        name="Lattice Nodes as Text",
-        description="Also write the nodes' coordinates into the same folder",
-        default=False,
+    nodes: Flag(
+        "Lattice Nodes as Text", "Also write the nodes' coordinates into the same folder", default=False
     )
 
     def invoke(self, context, event):

@@ -3,12 +3,9 @@
 If Blender's importers also accept a file, Blender asks for one.
 """
 
-# Blender reads the annotations themselves: no `from __future__ import annotations` here.
-
 from pathlib import Path
 
 import bpy
-from bpy.props import FloatVectorProperty, StringProperty
 
 from ...design.body import read_body
 from ...design.parameters import read_unit
@@ -16,6 +13,7 @@ from ...errors import InputError
 from ...reading import parse_toml, text_in
 from ..preview import skeletons
 from ..shared import landing, viewports
+from ..shared.blender_property import Numbers, Text
 from ..shared.operators import FreeOperator, operator
 from ..unit import object as unit_object
 from ..unit.base_classes import UnitOperator
@@ -25,9 +23,7 @@ SURFACES = ".stl;.obj;.ply"
 _LONGEST = 10_000_000
 
 
-_FILE = StringProperty(
-    name="File", description="The file that was dropped", subtype="FILE_PATH", options={"SKIP_SAVE"}
-)
+_FILE = Text("File", "The file that was dropped", subtype="FILE_PATH", options={"SKIP_SAVE"})
 
 
 def _path(filepath: str) -> Path:
@@ -53,9 +49,7 @@ def _at_the_mouse(operator, context, event):
     "Unit or Node Tree",
     invoke=_at_the_mouse,
     filepath=_FILE,
-    place=FloatVectorProperty(
-        name="Place", description="Where it was dropped", options={"HIDDEN", "SKIP_SAVE"}
-    ),
+    place=Numbers("Place", "Where it was dropped", options={"HIDDEN", "SKIP_SAVE"}),
 )
 def drop_toml(operator, context, filepath, place):
     """Add the unit that a TOML file describes where it is dropped, or open the node tree that it holds"""

@@ -12,7 +12,6 @@ from typing import Any
 import attrs
 import bpy
 import numpy as np
-from bpy.props import EnumProperty
 from bpy_extras.view3d_utils import location_3d_to_region_2d
 from mathutils import Matrix, Vector
 
@@ -23,7 +22,7 @@ from ..live_bending import state as live
 from ..results import motion as motion_parts
 from ..results.operators import NO_MOTION
 from ..shared import timeline, viewports
-from ..shared.blender_property import step_of
+from ..shared.blender_property import Choice, step_of
 from ..shared.displays import editable
 from ..shared.registration import at_end, at_start
 from ..shared.wording import in_panel, label
@@ -116,7 +115,7 @@ class MU_OT_drag(UnitPoll, bpy.types.Operator):
     bl_label = "Drag"
     bl_options = {"REGISTER", "UNDO", "BLOCKING", "GRAB_CURSOR"}
 
-    what: EnumProperty(name="What", description="Quantity that the mouse changes", items=ITEMS)
+    what: Choice("What", "Quantity that the mouse changes", items=ITEMS)
 
     @classmethod
     def description(cls, context, properties):
@@ -264,11 +263,7 @@ class MU_WT_size(bpy.types.WorkSpaceTool):
     bl_widget = None
     bl_keymap = (
         ("mu.drag", {"type": "LEFTMOUSE", "value": "CLICK_DRAG", "any": True}, None),
-        (
-            "view3d.select",
-            {"type": "LEFTMOUSE", "value": "CLICK"},
-            {"properties": [("deselect_all", True)]},
-        ),
+        ("view3d.select", {"type": "LEFTMOUSE", "value": "CLICK"}, {"properties": [("deselect_all", True)]}),
     )
 
     @staticmethod

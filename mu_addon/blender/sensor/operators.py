@@ -1,11 +1,8 @@
 """Connect the real sensor, mark, calibrate, zero, and show its twin."""
 
-# Blender reads the annotations themselves: no `from __future__ import annotations` here.
-
 from pathlib import Path
 
 import bpy
-from bpy.props import BoolProperty, StringProperty
 
 from ...design.printing.finding import counted
 from ...errors import InputError
@@ -13,6 +10,7 @@ from ...sensing.session import SWEEP
 from ..jobs.operators import FILES, RUN_FILES, job_operators
 from ..results.operators import MotionOperator
 from ..shared import viewports
+from ..shared.blender_property import Flag, Text
 from ..shared.operators import FreeOperator, ask_properties, operator
 from ..simulate import study_folder as studies
 from ..unit.base_classes import UnitOperator
@@ -37,16 +35,11 @@ def sensor_ports(operator):
     """Look for serial ports"""
     found = sensor.find_ports()
     operator.report(
-        {"INFO"},
-        counted(len(found), "serial port", "serial ports") if found else "No serial port is there",
+        {"INFO"}, counted(len(found), "serial port", "serial ports") if found else "No serial port is there"
     )
 
 
-@operator(
-    UnitOperator,
-    "Use Port",
-    name=StringProperty(name="Name", description="A port's device, or usb:VID:PID[:SERIAL]"),
-)
+@operator(UnitOperator, "Use Port", name=Text("Name", "A port's device, or usb:VID:PID[:SERIAL]"))
 def sensor_port(root, name):
     """Use this port"""
     root.mu_sensor.port = name
@@ -72,9 +65,7 @@ def sensor_connect(root):
     UnitOperator,
     "Disconnect",
     undo=False,
-    others=BoolProperty(
-        name="Others", description="The sensors of all other units instead", options={"SKIP_SAVE"}
-    ),
+    others=Flag("Others", "The sensors of all other units instead", options={"SKIP_SAVE"}),
 )
 def sensor_disconnect(root, others):
     """End the session: the port is free, and the recording complete"""
@@ -94,7 +85,7 @@ def sensor_pause(root):
     "Mark",
     undo=False,
     invoke=ask_properties,
-    words=StringProperty(name="Words", description="What happens now", default="here"),
+    words=Text("Words", "What happens now", default="here"),
 )
 def sensor_mark(root, words):
     """Write a mark with a text into the recording, at this moment"""
@@ -111,9 +102,7 @@ def sensor_freeze(root):
     viewports.redraw()
 
 
-@operator(
-    UnitOperator, "Draw Channel", name=StringProperty(name="Channel", description="Name of the channel")
-)
+@operator(UnitOperator, "Draw Channel", name=Text("Channel", "Name of the channel"))
 def sensor_channel(root, name):
     """Show or hide this channel in the plot"""
     settings = root.mu_sensor
@@ -125,9 +114,7 @@ def sensor_channel(root, name):
     SessionOperator,
     "Guided Sweep",
     undo=False,
-    on=BoolProperty(
-        name="Begin", description="Begin a sweep, or stop it", default=True, options={"SKIP_SAVE"}
-    ),
+    on=Flag("Begin", "Begin a sweep, or stop it", default=True, options={"SKIP_SAVE"}),
 )
 def sensor_sweep(root, on):
     """Calibrate step by step: hold the unit at a sequence of angles; the fit follows the last"""
@@ -180,15 +167,12 @@ def sensor_back(root):
     UnitOperator,
     "Calibrate",
     undo=False,
-    data=StringProperty(
-        name="Sweeps",
-        description="Folder. Empty: the one that the panel names",
-        subtype="DIR_PATH",
-        options={"SKIP_SAVE"},
+    data=Text(
+        "Sweeps", "Folder. Empty: the one that the panel names", subtype="DIR_PATH", options={"SKIP_SAVE"}
     ),
-    channel=StringProperty(
-        name="Light",
-        description="Channel of the light to calibrate from now on. Empty: the one that the panel names",
+    channel=Text(
+        "Light",
+        "Channel of the light to calibrate from now on. Empty: the one that the panel names",
         options={"SKIP_SAVE"},
     ),
 )
@@ -212,9 +196,7 @@ def sensor_zero(root):
     viewports.redraw()
 
 
-@operator(
-    MotionOperator, "Show Twin", on=BoolProperty(name="Show", description="Show or hide it", default=True)
-)
+@operator(MotionOperator, "Show Twin", on=Flag("Show", "Show or hide it", default=True))
 def sensor_twin(root, on):
     """Show or hide the simulated unit next to the design, bent to the sensor's angle"""
     twin.show(root) if on else twin.hide(root)

@@ -3,10 +3,10 @@
 # Blender reads the annotations themselves: no `from __future__ import annotations` here.
 
 import bpy
-from bpy.props import BoolProperty, EnumProperty, FloatProperty, IntProperty, StringProperty
+from bpy.props import StringProperty
 
 from ...sensing.settings import BAUD, PORT, SPEED
-from ..shared.blender_property import blender_property, path_property
+from ..shared.blender_property import Choice, Count, Flag, Number, Text, blender_property, path_property
 from ..shared.registration import property_of
 from . import state as sensor
 
@@ -30,9 +30,9 @@ def _again(group, context):
 class MU_PG_sensor(bpy.types.PropertyGroup):
     """Connection, calibration and display of a unit's sensor."""
 
-    source: EnumProperty(
-        name="Sensor",
-        description="Source of the samples",
+    source: Choice(
+        "Sensor",
+        "Source of the samples",
         items=[
             ("port", "Serial Port", "The sensor at a port of this computer"),
             ("simulated", "Simulated", "A simulated sensor that bends by 45 degrees every 8 s"),
@@ -43,15 +43,15 @@ class MU_PG_sensor(bpy.types.PropertyGroup):
     baud: blender_property(BAUD, name="Baud")
     replay: path_property("Recording", "Folder of the recording to play", folder=True)
     speed: blender_property(SPEED._replace(low=0.01, high=100.0), precision=2)
-    channel: StringProperty(
-        name="Light",
-        description="Channel of the light. Empty: the first whose name begins with light, or the first",
+    channel: Text(
+        "Light",
+        "Channel of the light. Empty: the first whose name begins with light, or the first",
         search=_channels,
         search_options={"SUGGESTION"},
     )
-    dark: StringProperty(
-        name="Dark",
-        description="Channel of the dark level, or volts. Empty: the first whose name begins with dark, or 0",
+    dark: Text(
+        "Dark",
+        "Channel of the dark level, or volts. Empty: the first whose name begins with dark, or 0",
         search=_channels,
         search_options={"SUGGESTION"},
     )
@@ -61,25 +61,15 @@ class MU_PG_sensor(bpy.types.PropertyGroup):
     data: path_property(
         "Sweeps", "Folder of a recording with angles marked, or of measured data", folder=True
     )
-    plot: BoolProperty(name="Plot", description="Draw the signal in the viewport", default=True)
-    seconds: FloatProperty(
-        name="Seconds",
-        description="How much of the past the plot shows",
-        default=10.0,
-        min=1.0,
-        max=600.0,
-        update=_again,
+    plot: Flag("Plot", "Draw the signal in the viewport", default=True)
+    seconds: Number(
+        "Seconds", "How much of the past the plot shows", default=10.0, min=1.0, max=600.0, update=_again
     )
     hidden: StringProperty(options={"HIDDEN"})
-    sweep_from: FloatProperty(name="First (deg)", description="Where a sweep begins and ends", default=0.0)
-    sweep_to: FloatProperty(name="Last (deg)", description="Where a sweep turns", default=45.0)
-    sweep_step: FloatProperty(
-        name="Step (deg)", description="From one held angle to the next", default=15.0, min=0.5
+    sweep_from: Number("First (deg)", "Where a sweep begins and ends", default=0.0)
+    sweep_to: Number("Last (deg)", "Where a sweep turns", default=45.0)
+    sweep_step: Number("Step (deg)", "From one held angle to the next", default=15.0, min=0.5)
+    sweep_times: Count(
+        "Times", "Number of sweeps back and forth: two show how well it repeats", default=2, min=2
     )
-    sweep_times: IntProperty(
-        name="Times",
-        description="Number of sweeps back and forth: two show how well it repeats",
-        default=2,
-        min=2,
-    )
-    known_deg: FloatProperty(name="Angle (deg)", description="The angle at which the unit is held now")
+    known_deg: Number("Angle (deg)", "The angle at which the unit is held now")

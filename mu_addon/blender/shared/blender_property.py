@@ -5,15 +5,20 @@ that: 0.0009 m in its start-up scene. Lengths of lenses are in millimetres in ev
 metric units when typed; fields of lengths here use that subtype.
 """
 
-# Blender reads the annotations themselves: no `from __future__ import annotations` here.
-
 import textwrap
 from collections.abc import Callable
 from typing import Any
 from zlib import crc32
 
 import numpy as np
-from bpy.props import BoolProperty, EnumProperty, FloatProperty, IntProperty, StringProperty
+from bpy.props import (
+    BoolProperty,
+    EnumProperty,
+    FloatProperty,
+    FloatVectorProperty,
+    IntProperty,
+    StringProperty,
+)
 
 from ...design.quantity import Description
 from .wording import choice_label, label, tooltip
@@ -64,6 +69,16 @@ def blender_property(d: Description, update=None, options=frozenset(), name="", 
 def step_of(high_mm: float) -> int:
     """Change in hundredths of a millimetre by a drag of one pixel, of a length of up to so many mm."""
     return 10 if high_mm > 20 else 1
+
+
+def _described(make: Callable[..., Any]) -> Callable[..., Any]:
+    """A maker of Blender properties that is given the name and what it is first, then the rest by name."""
+    return lambda name, description, **more: make(name=name, description=description, **more)
+
+
+Flag, Text, Choice = map(_described, (BoolProperty, StringProperty, EnumProperty))
+Number, Numbers, Count = map(_described, (FloatProperty, FloatVectorProperty, IntProperty))
+"""Properties that no setting of the core describes, by name and description."""
 
 
 def millimetres(step: float, **shared):

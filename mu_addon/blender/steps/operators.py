@@ -1,10 +1,7 @@
 """The core's steps as operators, made from its list, each with its parameters in the redo panel."""
 
-# Blender reads the annotations themselves: no `from __future__ import annotations` here.
-
 import attrs
 import bpy
-from bpy.props import BoolProperty, EnumProperty, StringProperty
 
 from ...design.parameters import SECTIONS
 from ...design.quantity import describe
@@ -12,7 +9,7 @@ from ...design.repairs import tied
 from ...design.steps import STEPS, Step, downstream
 from ...errors import InputError
 from ..shared import updates
-from ..shared.blender_property import blender_property, exact, millimetres, step_of
+from ..shared.blender_property import Choice, Flag, Text, blender_property, exact, millimetres, step_of
 from ..shared.operators import operator
 from ..shared.wording import label, sentence, tooltip
 from ..unit import object as unit_object
@@ -38,9 +35,7 @@ def _annotations(step: Step) -> dict:
                 shared = {"name": label(d), "description": tooltip(d), "options": {"SKIP_SAVE"}}
                 found[d.name + TRUE] = millimetres(step_of(d.high), **shared)
     if step.muting:
-        found["muted"] = BoolProperty(
-            name="Mute", description=f"Leave this step out: {step.muting}", options={"SKIP_SAVE"}
-        )
+        found["muted"] = Flag("Mute", f"Leave this step out: {step.muting}", options={"SKIP_SAVE"})
     return found
 
 
@@ -124,12 +119,12 @@ def _generated(step: Step) -> type:
 @operator(
     UnitOperator,
     "Mute Step",
-    step=EnumProperty(
-        name="Step",
-        description="Step of the design",
+    step=Choice(
+        "Step",
+        "Step of the design",
         items=[(step.name, step.name.capitalize(), step.muting) for step in STEPS.values() if step.muting],
     ),
-    muted=BoolProperty(name="Mute", description="Leave the step out", default=True),
+    muted=Flag("Mute", "Leave the step out", default=True),
 )
 def mute(root, step, muted):
     """Mute or unmute a step of the design"""
@@ -140,9 +135,7 @@ def mute(root, step, muted):
 
 
 @operator(
-    UnitOperator,
-    "Run Step Again",
-    step=StringProperty(name="Step", description="Name of a step of the design", default="profile"),
+    UnitOperator, "Run Step Again", step=Text("Step", "Name of a step of the design", default="profile")
 )
 def again(root, step):
     """Run one step again, and of the later steps those whose input changes"""

@@ -5,11 +5,11 @@
 from pathlib import Path
 
 import bpy
-from bpy.props import StringProperty
 
 from ...errors import InputError
 from ...studies.track import Track
 from ..jobs.here import run_here
+from ..shared.blender_property import Text
 from ..shared.operators import RootOperator, operator, reports_errors, unless
 from ..unit import object as unit_object
 from . import properties as bench
@@ -52,11 +52,7 @@ class MU_OT_track_write(bpy.types.Operator):
     bl_label = "Write Measured Data"
     bl_options = {"REGISTER", "UNDO"}
 
-    clip: StringProperty(
-        name="Clip",
-        description="Name of a clip of this file. Empty: the one in the editor",
-        options={"SKIP_SAVE"},
-    )
+    clip: Text("Clip", "Name of a clip of this file. Empty: the one in the editor", options={"SKIP_SAVE"})
 
     @classmethod
     def poll(cls, context):

@@ -5,30 +5,23 @@
 from typing import Any
 
 import bpy
-from bpy.props import (
-    BoolProperty,
-    EnumProperty,
-    FloatProperty,
-    FloatVectorProperty,
-    StringProperty,
-)
 
 from ...errors import InputError
 from ...measured.bench import Bench, MarkerSettings
 from ...measured.kinds import ROLES
 from ...measured.video import View
-from ..shared.blender_property import exact, path_property
+from ..shared.blender_property import Choice, Flag, Number, Numbers, Text, exact, path_property
 from ..shared.registration import property_of
 
 
 def _track(name: str, description: str):
-    return StringProperty(name=name, description=description)
+    return Text(name, description)
 
 
 def _place(name: str):
-    return FloatVectorProperty(
-        name=name,
-        description="Its y (toward more lattice) and z (along the axis) in the unit's frame, mm",
+    return Numbers(
+        name,
+        "Its y (toward more lattice) and z (along the axis) in the unit's frame, mm",
         size=2,
         precision=2,
     )
@@ -38,23 +31,19 @@ def _place(name: str):
 class MU_PG_bench(bpy.types.PropertyGroup):
     """Setup of a video: the object, the view, and the markers."""
 
-    camera: EnumProperty(
-        name="Camera at",
-        description="Side of the unit that the camera looks from, along x",
+    camera: Choice(
+        "Camera at",
+        "Side of the unit that the camera looks from, along x",
         items=[
             ("+x", "+x", "With the axis upward, the side with more lattice (+y) is on the right"),
             ("-x", "-x", "With the axis upward, the side with more lattice (+y) is on the left"),
         ],
     )
-    marks: EnumProperty(
-        name="Markers are",
-        description="Kind of markers",
+    marks: Choice(
+        "Markers are",
+        "Kind of markers",
         items=[
-            (
-                "crosses",
-                "Crosses",
-                "Checks or crosses, which show their rotation: the tracker follows it",
-            ),
+            ("crosses", "Crosses", "Checks or crosses, which show their rotation: the tracker follows it"),
             (
                 "dots",
                 "Dots",
@@ -68,9 +57,9 @@ class MU_PG_bench(bpy.types.PropertyGroup):
     base_2_mm: _place("Place of Base, Other")
     tip_1: _track("Tip", "A marker on the tip's end; without a tip, only places are written")
     tip_2: _track("Tip, Other", "Another marker on the tip's end; the farther apart, the better")
-    scale_by: EnumProperty(
-        name="Scale by",
-        description="How the scale, millimetres per pixel, is known",
+    scale_by: Choice(
+        "Scale by",
+        "How the scale, millimetres per pixel, is known",
         items=[
             ("base", "Base", "The places of the two markers on the base"),
             ("ruler", "Ruler", "Two marks of a known distance, as far from the camera as the markers"),
@@ -79,38 +68,30 @@ class MU_PG_bench(bpy.types.PropertyGroup):
     )
     ruler_1: _track("Ruler", "A mark on a ruler")
     ruler_2: _track("Ruler, Other", "Another mark on the ruler")
-    ruler_mm: FloatProperty(
-        name="Distance (mm)", description="Distance of the ruler's two marks", min=0.0, default=50.0
-    )
-    mm_per_pixel: FloatProperty(
-        name="mm a Pixel", description="Size of a pixel in the plane of the markers", min=0.0, precision=5
-    )
-    follow_base: BoolProperty(
-        name="Base Moves",
-        description="Measure relative to the base in each frame, for a camera or clamp that moves; otherwise "
+    ruler_mm: Number("Distance (mm)", "Distance of the ruler's two marks", min=0.0, default=50.0)
+    mm_per_pixel: Number("mm a Pixel", "Size of a pixel in the plane of the markers", min=0.0, precision=5)
+    follow_base: Flag(
+        "Base Moves",
+        "Measure relative to the base in each frame, for a camera or clamp that moves; otherwise "
         "relative to its mean position, which gives less noise",
     )
-    fps: FloatProperty(
-        name="Frame Rate",
-        description="Frames per second. 0: the rate stored in the clip; a sequence of pictures has none, and "
+    fps: Number(
+        "Frame Rate",
+        "Frames per second. 0: the rate stored in the clip; a sequence of pictures has none, and "
         "a slow-motion film has a wrong one",
         min=0.0,
     )
-    starts_s: FloatProperty(
-        name="Starts at (s)",
-        description="Time of the pressure's record at the clip's first frame",
-        precision=3,
-    )
+    starts_s: Number("Starts at (s)", "Time of the pressure's record at the clip's first frame", precision=3)
     pressure: path_property(
         "Pressure", "CSV file of time_s,pressure_kPa: a recording, or the protocol that was played"
     )
     folder: path_property(
         "Measured Data", "Folder that gets the experiment; other clips may be in it already", folder=True
     )
-    title: StringProperty(name="Experiment", description="Name of the experiment. Empty: the clip's")
-    role: EnumProperty(
-        name="Role",
-        description="Use of the experiment",
+    title: Text("Experiment", "Name of the experiment. Empty: the clip's")
+    role: Choice(
+        "Role",
+        "Use of the experiment",
         items=[
             (ROLES[0], "Fit", "The model may be fitted to it"),
             (
@@ -120,16 +101,14 @@ class MU_PG_bench(bpy.types.PropertyGroup):
             ),
         ],
     )
-    unit_scale: FloatProperty(
-        name="Scale", description="Scale of the unit that was filmed", default=1.0, min=0.01
-    )
-    orientation_deg: FloatProperty(
-        name="Gravity about x (deg)",
-        description="Direction of gravity about x: at 0 the unit hangs with the tip down",
+    unit_scale: Number("Scale", "Scale of the unit that was filmed", default=1.0, min=0.01)
+    orientation_deg: Number(
+        "Gravity about x (deg)",
+        "Direction of gravity about x: at 0 the unit hangs with the tip down",
         min=-360.0,
         max=360.0,
     )
-    specimen: StringProperty(name="Specimen", description="Name of the print, such as A; may be empty")
+    specimen: Text("Specimen", "Name of the print, such as A; may be empty")
 
 
 def missing(clip: Any) -> str:

@@ -1,20 +1,17 @@
 """Blender properties of a unit's parameters; panels show the true length in mm."""
 
-# Blender reads the annotations themselves: no `from __future__ import annotations` here.
-
 from collections.abc import Callable
 from functools import cache
 from typing import Any
 
 import bpy
-from bpy.props import EnumProperty
 
 from ...design.anchors import windows
 from ...design.parameters import SECTIONS
 from ...design.quantity import Description, describe
 from ...design.repairs import tied
 from ..shared import updates
-from ..shared.blender_property import blender_property, exact, millimetres, step_of
+from ..shared.blender_property import Choice, blender_property, exact, millimetres, step_of
 from ..shared.wording import anchors_of, label, path_symbol, tooltip
 
 
@@ -123,9 +120,9 @@ def path_menu(count_of: Callable[[Any], int], free: str = "") -> Any:
     def names(group: Any) -> list[str]:
         return [name if name != "free" else "" for name, *_ in items(group, None)]
 
-    return EnumProperty(
-        name="Sensor Path",
-        description="Anchors along which the waveguide lies",
+    return Choice(
+        "Sensor Path",
+        "Anchors along which the waveguide lies",
         items=items,
         get=lambda group: names(group).index(group.path),
         set=lambda group, number: setattr(group, "path", names(group)[number]),

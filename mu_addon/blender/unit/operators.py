@@ -4,7 +4,7 @@
 
 import attrs
 import bpy
-from bpy.props import BoolProperty, EnumProperty, FloatProperty, StringProperty
+from bpy.props import StringProperty
 
 from ...design.parameters import Unit
 from ...design.quantity import describe
@@ -12,7 +12,7 @@ from ...design.repairs import tied
 from ...design.settings import PRESET
 from ...errors import InputError
 from ..shared import landing, scene_units, updates, viewports
-from ..shared.blender_property import exact, listed
+from ..shared.blender_property import Choice, Flag, Number, Text, exact, listed
 from ..shared.operators import FreeOperator, operator, reports_errors
 from ..shared.wording import label, tooltip
 from . import object as unit_object
@@ -50,25 +50,16 @@ class MU_OT_add(bpy.types.Operator):
     bl_label = "Monolithic Unit"
     bl_options = {"REGISTER", "UNDO"}
 
-    preset: EnumProperty(
-        name="Preset", description="Unit to begin with", items=listed(_presets), options={"SKIP_SAVE"}
-    )
-    scale: FloatProperty(
-        name="Scale",
-        description=tooltip(_SCALE),
-        default=0.0,
-        min=0.0,
-        max=_SCALE.high,
-        options={"SKIP_SAVE"},
-    )
-    millimetres: BoolProperty(
-        name="Scene in Millimetres",
-        description="Also set the scene's unit of length, one Blender unit a millimetre",
+    preset: Choice("Preset", "Unit to begin with", items=listed(_presets), options={"SKIP_SAVE"})
+    scale: Number("Scale", tooltip(_SCALE), default=0.0, min=0.0, max=_SCALE.high, options={"SKIP_SAVE"})
+    millimetres: Flag(
+        "Scene in Millimetres",
+        "Also set the scene's unit of length, one Blender unit a millimetre",
         default=False,
     )
     # The preset that the scale belongs to: another one chosen in the redo panel sets its own scale.
     scaled: StringProperty(options={"HIDDEN", "SKIP_SAVE"})
-    frame: BoolProperty(name="Frame in View", description="Bring the new unit into view", default=True)
+    frame: Flag("Frame in View", "Bring the new unit into view", default=True)
 
     @reports_errors
     def execute(self, context):
@@ -103,8 +94,8 @@ def rebuild(root):
     "Use the Value That Fits",
     # The full rule, for which the head of the panel may have no room.
     tip=lambda context, given: given.why and f"{given.why}\n\nSet the nearest value that fits",
-    section=StringProperty(name="Section", description="Section of the parameter: chambers, lattice ..."),
-    name=StringProperty(name="Parameter", description="Name of the parameter"),
+    section=Text("Section", "Section of the parameter: chambers, lattice ..."),
+    name=Text("Parameter", "Name of the parameter"),
     why=StringProperty(options={"HIDDEN", "SKIP_SAVE"}),
 )
 def fit(root, section, name):

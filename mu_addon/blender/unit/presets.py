@@ -1,15 +1,13 @@
 """Presets and their operators: shipped units, and the user's own as TOML files in the user's folder."""
 
-# Blender reads the annotations themselves: no `from __future__ import annotations` here.
-
 import re
 from pathlib import Path
 
 import attrs
-from bpy.props import StringProperty
 
 from ...design.parameters import Unit, load_preset, preset_names, read_unit, write_unit
 from ...errors import InputError, OutputError
+from ..shared.blender_property import Text
 from ..shared.compat import user_folder
 from ..shared.operators import FreeOperator, operator
 from . import object as unit_object
@@ -65,11 +63,7 @@ def _folder() -> Path:
     return user_folder("presets")
 
 
-@operator(
-    UnitOperator,
-    "Load Preset",
-    name=StringProperty(name="Preset", description="Name of a preset; your own begin with `user:`"),
-)
+@operator(UnitOperator, "Load Preset", name=Text("Preset", "Name of a preset; your own begin with `user:`"))
 def preset_load(root, name):
     """Set every parameter of the unit to those of a preset"""
     core = load(name)
@@ -88,7 +82,7 @@ def _ask_name(operator, context, event):
     "Save Preset",
     undo=False,
     invoke=_ask_name,
-    name=StringProperty(name="Name", description="Name of your preset", default="my unit"),
+    name=Text("Name", "Name of your preset", default="my unit"),
 )
 def preset_save(operator, root, name):
     """Save the unit's parameters as your own preset, a TOML file that headless/run.py also reads"""
@@ -101,7 +95,7 @@ def preset_save(operator, root, name):
     "Remove Preset",
     undo=False,
     invoke=lambda operator, context, event: context.window_manager.invoke_confirm(operator, event),
-    name=StringProperty(name="Preset", description="Name of your preset"),
+    name=Text("Preset", "Name of your preset"),
 )
 def preset_remove(name):
     """Remove a preset of your own"""

@@ -10,14 +10,7 @@ import textwrap
 import attrs
 import bpy
 import numpy as np
-from bpy.props import (
-    BoolProperty,
-    CollectionProperty,
-    EnumProperty,
-    IntProperty,
-    PointerProperty,
-    StringProperty,
-)
+from bpy.props import CollectionProperty, PointerProperty, StringProperty
 
 from ...design.parameters import SECTIONS, Unit
 from ...design.quantity import Description, describe
@@ -25,7 +18,16 @@ from ...errors import InputError
 from ...fem.device import DEVICE
 from ...meshing.settings import REFINE, SELF_CONTACT
 from ...simulate_and_place.settings import ALL_PATHS, ORIENTATION, PATHS, PROTOCOL, SELF_FRICTION
-from ..shared.blender_property import BESIDE_BLEND_FILE, blender_property, exact, path_property
+from ..shared.blender_property import (
+    BESIDE_BLEND_FILE,
+    Choice,
+    Count,
+    Flag,
+    Text,
+    blender_property,
+    exact,
+    path_property,
+)
 from ..shared.registration import property_of
 from ..shared.updates import Signal
 from .fields import generated_group, set_sections, tied
@@ -52,9 +54,9 @@ _HEAD = {d.name: d for d in describe(Unit)}
 class MU_PG_study(bpy.types.PropertyGroup):
     """Settings of the next simulation."""
 
-    command: EnumProperty(
-        name="Job",
-        description="What is simulated",
+    command: Choice(
+        "Job",
+        "What is simulated",
         items=[
             ("place", "Place the Sensor", "Motion of the unit and the ranking of all sensor paths"),
             ("simulate", "Motion Only", "Motion of the unit without a sensor"),
@@ -107,10 +109,8 @@ def _view_changed(group, context):
 class MU_PG_step(bpy.types.PropertyGroup):
     """One step of the design in a unit's stack; its name is the core's."""
 
-    muted: BoolProperty(
-        name="Mute", description="Leave this step out: its input is passed on unchanged", update=_changed
-    )
-    shown: BoolProperty(name="Show", description="Show this step's result in the preview", update=_changed)
+    muted: Flag("Mute", "Leave this step out: its input is passed on unchanged", update=_changed)
+    shown: Flag("Show", "Show this step's result in the preview", update=_changed)
 
 
 def title_property(noun: str):
@@ -124,7 +124,7 @@ def title_property(noun: str):
         group.id_data.name = value
 
     text = f"Name of the {noun}, which is that of its object"
-    return StringProperty(name="Name", description=text, get=read, set=write)
+    return Text("Name", text, get=read, set=write)
 
 
 @property_of(bpy.types.Object, "mu_unit")
@@ -141,26 +141,22 @@ class MU_PG_unit(bpy.types.PropertyGroup):
         },
         "study": PointerProperty(type=MU_PG_study, description="Stages of the next simulation"),
         "stack": CollectionProperty(type=MU_PG_step, description="Steps of the design, in their order"),
-        "step": IntProperty(name="Step", description="The step whose parameters are shown"),
+        "step": Count("Step", "The step whose parameters are shown"),
         # Name and values of the resin that was chosen, see `resins`.
         "resin": StringProperty(options={"HIDDEN"}),
-        "path": StringProperty(
-            name="Sensor Path", description="Window of anchors that the waveguide follows", update=_changed
+        "path": Text("Sensor Path", "Window of anchors that the waveguide follows", update=_changed),
+        "cut": Flag(
+            "Cut Open", "Show the unit cut in its bending plane, to see chambers and wall", update=_changed
         ),
-        "cut": BoolProperty(
-            name="Cut Open",
-            description="Show the unit cut in its bending plane, to see chambers and wall",
-            update=_changed,
-        ),
-        "candidates": BoolProperty(
-            name="Show Candidates",
-            description="Draw every candidate path beside the unit at rest, at its true height, to compare "
+        "candidates": Flag(
+            "Show Candidates",
+            "Draw every candidate path beside the unit at rest, at its true height, to compare "
             "them and choose one by a click. Result hides them, because the unit is bent there",
             update=_candidates_changed,
         ),
-        "show": EnumProperty(
-            name="Show",
-            description="The unit as it is being designed, as it will be printed, or as it moves",
+        "show": Choice(
+            "Show",
+            "The unit as it is being designed, as it will be printed, or as it moves",
             items=[
                 ("preview", "Preview", "Skeleton of the design, follows every slider"),
                 ("solid", "Solid", "The printable solid that was built last"),

@@ -1,17 +1,15 @@
 """The resin of a unit, by its name: the parameters that it sets, and whether they still are those."""
 
-# Blender reads the annotations themselves: no `from __future__ import annotations` here.
-
 import json
 from typing import Any
 
 import attrs
 import numpy as np
-from bpy.props import EnumProperty
 
 from ...design.assets import asset_names
 from ...design.parameters import SECTIONS, Unit
 from ..shared import updates
+from ..shared.blender_property import Choice
 from ..shared.operators import operator
 from . import object as unit_object
 from .base_classes import UnitOperator
@@ -53,9 +51,9 @@ def name_of(root: Any) -> str:
 @operator(
     UnitOperator,
     "Resin",
-    name=EnumProperty(
-        name="Resin",
-        description="Resin of the unit's wall; its file says where each constant is from",
+    name=Choice(
+        "Resin",
+        "Resin of the unit's wall; its file says where each constant is from",
         items=[(name, name.replace("-", " ").title(), "") for name in asset_names("materials")],
     ),
 )
