@@ -23,7 +23,7 @@ FORMATS = (
 
 
 @property_of(bpy.types.Object, "mu_print")
-class MU_PG_print(bpy.types.PropertyGroup):
+class MU_PG_printing(bpy.types.PropertyGroup):
     """Print settings of a unit, and the files to write."""
 
     printer: Choice(

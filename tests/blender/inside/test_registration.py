@@ -170,6 +170,12 @@ def test_a_button_is_one_file(tmp_path):
     assert not hasattr(bpy.types, "MU_OT_thicken")
 
 
+def test_a_file_of_before_finds_every_property_that_it_has():
+    from .property_ids import KEPT, listed
+
+    assert listed() == KEPT.read_text(encoding="utf-8").splitlines()
+
+
 def test_values_survive_single_precision():
     from mu_addon.blender.shared import updates
     from mu_addon.blender.shared.blender_property import exact
