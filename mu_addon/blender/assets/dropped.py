@@ -36,22 +36,20 @@ def take_asset(operator, unit, asset):
     if root is None or linked(root):
         raise InputError("there is no unit to take it", asset, "drop it on a unit of this file")
     if resin is not None and resin.get(RESIN):
-        _take_resin(root, resin)
+        resins.take(root, resin.name, parse_json(resin[RESIN], f"{resin.name}, {RESIN}"))
+        _restore_slots(root)
+        unit_object.rebuild(root)
         words = f"{root.name} is of {resin.name}: its wall's modulus, Poisson's ratio and law"
     elif box is not None and box.get(PRINTER):
         words = f"{root.name} is printed by {box.name}"
-        _take_printer(root, box)
+        root.mu_print.printer = box[PRINTER]
+        _remove(box)
+        unit_object.make_active(bpy.context, root)
     else:
         raise InputError(
             f"{asset!r} is neither a resin nor a printer", "assets", "drop one of this extension"
         )
     operator.report({"INFO"}, words)
-
-
-def _take_resin(root: Any, resin: Any) -> None:
-    resins.take(root, resin.name, parse_json(resin[RESIN], f"{resin.name}, {RESIN}"))
-    _restore_slots(root)
-    unit_object.rebuild(root)
 
 
 def _restore_slots(root: Any) -> None:
@@ -67,12 +65,6 @@ def _restore_slots(root: Any) -> None:
             if own is None or own.get(RESIN):
                 name = usual[number] if number < len(usual) else "MU Solid"
                 root.data.materials[number] = materials.material(name)
-
-
-def _take_printer(root: Any, box: Any) -> None:
-    root.mu_print.printer = box[PRINTER]
-    _remove(box)
-    unit_object.make_active(bpy.context, root)
 
 
 def _remove(box: Any) -> None:

@@ -45,14 +45,12 @@ class MU_PT_evidence(UnitPanel, bpy.types.Panel):
             alert(layout, found.trouble)
             return
         _experiments(layout, context, root, found.measured)
-        draw_job(
-            layout, root, evidence.DIAGNOSIS, "mu.evidence_diagnose", "VIEWZOOM", start_words(root), top=True
-        )
+        button = "mu.evidence_diagnose", "VIEWZOOM", start_words(root)
+        draw_job(layout, root, evidence.DIAGNOSIS, *button, top=True)
         judged = evidence.diagnosis(root)
         if judged is None or not judged.name:
-            wrapped(
-                layout, "Not diagnosed yet" if judged is None else "The diagnosis is not finished", "INFO"
-            )
+            words = "Not diagnosed yet" if judged is None else "The diagnosis is not finished"
+            wrapped(layout, words, "INFO")
             return
         _verdict(layout, root, judged)
 
@@ -74,9 +72,8 @@ def _experiments(layout, context, root, measured):
         button = row.row(align=True)
         button.enabled = e.kind in ("unit_pressure", "pressure_step")
         on = e.name == shown
-        button.operator("mu.evidence_motion", text="", icon="PLAY", depress=on).experiment = (
-            "" if on else e.name
-        )
+        playing = button.operator("mu.evidence_motion", text="", icon="PLAY", depress=on)
+        playing.experiment = "" if on else e.name
     if shown:
         time, angles = evidence_motion.reading(root, context.scene)
         values = [f"{evidence_motion.LOOKS[s][0].lower()} {angle:+.1f}" for s, angle in angles.items()]
@@ -100,28 +97,20 @@ def _verdict(layout, root, judged):
     column.active = not judged.stale
     headline = str(judged.summary.get("headline", ""))
     title = evidence.NAMES.get(judged.name, judged.name)
-    wrapped(
-        column, f"{title}: {headline}" if judged.name in ("named", "ambiguous") else title, ICONS[judged.name]
-    )
+    title += f": {headline}" if judged.name in ("named", "ambiguous") else ""
+    wrapped(column, title, ICONS[judged.name])
     if judged.summary.get("to_do"):
         wrapped(column, in_panel(str(judged.summary["to_do"])), "TOOL_SETTINGS")
     # Mechanism and parameters with their intervals, or why nothing is named.
     wrapped(column, str(judged.summary.get("sentence", "")))
     for cause in judged.verdict.get("causes") or ():
         if cause["rivals"]:
-            rivals = ", ".join(readable(name) for name in cause["rivals"])
-            wrapped(
-                column,
-                f"Equally well explained by {rivals} instead of {readable(cause['effect'])}",
-                "QUESTION",
-            )
+            rivals, named = ", ".join(map(readable, cause["rivals"])), readable(cause["effect"])
+            wrapped(column, f"Equally well explained by {rivals} instead of {named}", "QUESTION")
     gain = (judged.verdict.get("gain") or {}).get("held_out") or {}
     if gain.get("rmse_before") is not None and judged.verdict.get("causes"):
-        wrapped(
-            column,
-            f"Error on held-out data {gain['rmse_before']:.3g} -> {gain['rmse_after']:.3g} {gain['unit']}",
-            "FORWARD",
-        )
+        change = f"{gain['rmse_before']:.3g} -> {gain['rmse_after']:.3g} {gain['unit']}"
+        wrapped(column, f"Error on held-out data {change}", "FORWARD")
     if judged.summary.get("next"):
         wrapped(column, f"Next: {judged.summary['next']}", "EXPERIMENTAL")
     _dependence(layout, judged)

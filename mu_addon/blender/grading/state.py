@@ -35,7 +35,8 @@ def begin(root: Any, field: Field) -> Any:
     mesh.materials.append(material("MU Lattice"))
     obj = displays.lock(displays.add(root, displays.PAINTED, "struts", mesh))
     group = obj.vertex_groups.new(name="Strut Factor")
-    weights = weights_of(field.cell_factors.ravel())
+    # By their logarithm, 0.5 for factor 1.
+    weights = np.clip(np.log(field.cell_factors.ravel() / LEAST) / np.log(MOST / LEAST), 0.0, 1.0)
     for cell, weight in enumerate(weights.tolist()):
         group.add(list(range(len(_CORNERS) * cell, len(_CORNERS) * (cell + 1))), weight, "REPLACE")
     return obj
@@ -54,15 +55,5 @@ def factors_on(obj: Any, field: Field) -> np.ndarray[Any, Any]:
     for vertex in obj.data.vertices:
         for element in vertex.groups:
             painted[vertex.index] = element.weight
-    shape = field.cell_factors.shape
-    return factors_of(painted.reshape(*shape, len(_CORNERS)).mean(axis=-1))
-
-
-def weights_of(factors: np.ndarray[Any, Any]) -> np.ndarray[Any, Any]:
-    """Weights from 0 to 1 of factors: by their logarithm, 0.5 for factor 1."""
-    return np.clip(np.log(factors / LEAST) / np.log(MOST / LEAST), 0.0, 1.0)
-
-
-def factors_of(weights: np.ndarray[Any, Any]) -> np.ndarray[Any, Any]:
-    """Factors of weights from 0 to 1."""
+    weights = painted.reshape(*field.cell_factors.shape, len(_CORNERS)).mean(axis=-1)
     return np.asarray(LEAST * (MOST / LEAST) ** weights)

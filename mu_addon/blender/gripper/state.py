@@ -30,7 +30,7 @@ def _given(root: Any) -> dict[str, Any]:
     props = root.mu_gripper
     return {
         "gripper": to_gripper(props),
-        "cubes_mm": (_side(props),),
+        "cubes_mm": (exact(props.cube_mm),),
         "beyond_mm": gripper_object.beyond_mm(root),
         "coarse": props.detail == "quick",
         "solid_only": props.detail == "part",
@@ -65,10 +65,6 @@ GRASPING = StudyJob(
 _tables: FileCache[Any] = FileCache()
 
 
-def _side(props: Any) -> float:
-    return exact(props.cube_mm)
-
-
 @attrs.frozen(eq=False)
 class Grasped:
     """Results of a grasp: figures by name, and why it is not of the present gripper and cube, or "".
@@ -85,7 +81,7 @@ class Grasped:
 
 def of(root: Any) -> Grasped | None:
     """The latest grasp of the cube that is chosen, or None; read again only when its files change."""
-    found, side = GRASPING.found(root), f"{_side(root.mu_gripper):g}"
+    found, side = GRASPING.found(root), f"{exact(root.mu_gripper.cube_mm):g}"
     if found is None or side not in found.content:
         return None
     path = found.folder / f"grasp_{side}.csv"

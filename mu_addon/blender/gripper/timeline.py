@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from contextlib import suppress
-from pathlib import Path
 from typing import Any
 
 import bpy
@@ -41,8 +40,12 @@ def show(root: Any, scene: Any) -> None:
     hide(root)
     time = data["time_s"]
     cut = root.mu_gripper.cut
-    whole = [(rest, data["triangles"], data["membrane"]) for rest in data["rest_mm"]]
-    fingers = _halves(found.folder) if cut else whole
+    fingers: Any = [(rest, data["triangles"], data["membrane"]) for rest in data["rest_mm"]]
+    if cut:
+        # Imported late, with the solver's packages.
+        from ...report.grasp_files import write_halves
+
+        fingers = write_halves(found.folder)
     for side, (rest, triangles, membrane) in zip(gripper_object.SIDES, fingers, strict=True):
         obj = gripper_object.new_part(root, gripper_object.MOVING + side)
         obj[CUT] = cut
@@ -59,13 +62,6 @@ def show(root: Any, scene: Any) -> None:
         set_curve(cube, "location", axis, frames, data["cube_mm"][:, axis])
     scene.frame_end = int(np.ceil(frames[-1]))
     _hide_preview(root, True)
-
-
-def _halves(folder: Path) -> Any:
-    # Imported late, with the solver's packages.
-    from ...report.grasp_files import write_halves
-
-    return write_halves(folder)
 
 
 @connected(PARAMETERS_CHANGED)

@@ -124,12 +124,9 @@ class MU_MT_nodes_group(bpy.types.Menu):
         layout.operator("mu.node_group_ungroup")
         layout.operator("mu.node_group_edit")
         layout.separator()
-        for name, kind in (
-            ("Group", GROUP),
-            ("Group Input", "NodeGroupInput"),
-            ("Group Output", "NodeGroupOutput"),
-        ):
-            _entry(layout, name, kind)
+        _entry(layout, "Group", GROUP)
+        _entry(layout, "Group Input", "NodeGroupInput")
+        _entry(layout, "Group Output", "NodeGroupOutput")
 
 
 class MU_MT_nodes_layout(bpy.types.Menu):
@@ -138,8 +135,8 @@ class MU_MT_nodes_layout(bpy.types.Menu):
     bl_label = "Layout"
 
     def draw(self, context):
-        for name, kind in (("Frame", "NodeFrame"), ("Reroute", "NodeReroute")):
-            _entry(self.layout, name, kind)
+        _entry(self.layout, "Frame", "NodeFrame")
+        _entry(self.layout, "Reroute", "NodeReroute")
 
 
 @menu("NODE_MT_add")

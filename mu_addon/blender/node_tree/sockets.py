@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import colorsys
 import zlib
+from collections.abc import Iterator
 from typing import Any
 
 import bpy
@@ -83,26 +84,15 @@ def _types() -> tuple[str, ...]:
     return tuple(dict.fromkeys([NUMBER, *found, ANY]))
 
 
-def _class(type_: str) -> Any:
-    name = identifier(type_)
-    members = {
-        "__doc__": f"Socket of a node tree: {type_}",
-        "bl_idname": name,
-        "bl_label": type_.capitalize(),
-        "mu_type": type_,
-    }
-    return type(name, (_Socket, bpy.types.NodeSocket), members)
+def _classes(type_: str) -> Iterator[Any]:
+    """The sockets of a type: of a node, and of a group's interface."""
+    own, title = identifier(type_), type_.capitalize()
+    for name, of, bases in (
+        (own, "a node tree", (_Socket, bpy.types.NodeSocket)),
+        (f"{own}_interface", "a group", (_InterfaceSocket, bpy.types.NodeTreeInterfaceSocket)),
+    ):
+        members = {"__doc__": f"Socket of {of}: {type_}", "bl_idname": name, "bl_label": title}
+        yield type(name, bases, members | {"bl_socket_idname": own, "mu_type": type_})
 
 
-def _interface_class(type_: str) -> Any:
-    name = f"{identifier(type_)}_interface"
-    members = {
-        "__doc__": f"Socket of a group: {type_}",
-        "bl_idname": name,
-        "bl_socket_idname": identifier(type_),
-        "bl_label": type_.capitalize(),
-    }
-    return type(name, (_InterfaceSocket, bpy.types.NodeTreeInterfaceSocket), members)
-
-
-CLASSES = tuple(made(type_) for type_ in _types() for made in (_class, _interface_class))
+CLASSES = tuple(made for type_ in _types() for made in _classes(type_))

@@ -22,9 +22,8 @@ class MU_PT_obstacles(UnitPanel, bpy.types.Panel):
         for obj in found:
             column = layout.column(align=True)
             row = column.row(align=True)
-            row.operator(
-                "mu.obstacle_select", text=obj.name, icon="CUBE", depress=obj.select_get()
-            ).name = obj.name
+            chosen = obj.select_get()
+            row.operator("mu.obstacle_select", text=obj.name, icon="CUBE", depress=chosen).name = obj.name
             row.operator("mu.obstacle_remove", text="", icon="X").name = obj.name
             column.prop(obj.mu_obstacle, "friction")
             for words in _troubles(root, obj):

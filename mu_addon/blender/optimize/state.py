@@ -58,7 +58,6 @@ class Findings:
     """
 
     folder: Path
-    status: str
     feasible: bool
     outcome: str
     simulated: int
@@ -276,7 +275,6 @@ def _read(summary: Any, folder: Path) -> Findings:
         proposed.append(Proposed(number, folder / Path(str(row["file"])).name, targets, *texts))
     return Findings(
         folder,
-        str(found.get("status", "")),
         found.get("feasible") is True,
         str(found.get("outcome", "")),
         int(found.get("designs") or 0),

@@ -298,16 +298,13 @@ def _with_section(half: Skeleton, section: Floats) -> Skeleton:
     r, z = section.T
     sides = [np.column_stack([np.zeros_like(r), sign * r, z]) for sign in (1.0, -1.0)]
     vertices, start = np.concatenate([half.vertices, *sides]), len(half.vertices)
-    cuts = _facing_x(vertices, np.concatenate([triangles + start, triangles + start + len(section)]))
+    cuts = np.concatenate([triangles + start, triangles + start + len(section)])
+    # They face +x.
+    p, q, r = vertices[cuts.T]
+    away = np.cross(q - p, r - p)[:, 0] < 0.0
+    cuts = np.where(away[:, None], cuts[:, ::-1], cuts)
     slots = np.repeat([0, 1], [sum(map(len, half.faces)), len(cuts)])
     return Skeleton(vertices, faces=(*half.faces, cuts), slots=slots)
-
-
-def _facing_x(vertices: Floats, triangles: Integers) -> Integers:
-    """Triangles turned so that they face +x."""
-    p, q, r = vertices[triangles.T]
-    away = np.cross(q - p, r - p)[:, 0] < 0.0
-    return np.where(away[:, None], triangles[:, ::-1], triangles)
 
 
 def write(mesh: Any, skeleton: Skeleton) -> None:

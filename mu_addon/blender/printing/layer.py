@@ -97,10 +97,7 @@ def _layers(root: Any, up: Any) -> Layers:
     key = (
         is_current,
         mesh.name,
-        mesh["mu_unit_hash"],
-        mesh["mu_path"],
-        mesh["mu_quality"],
-        mesh.get("mu_body", ""),
+        *(mesh[f"mu_{name}"] for name in ("unit_hash", "path", "quality", "body")),
         len(mesh.polygons),
         *up,
     )

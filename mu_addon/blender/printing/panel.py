@@ -127,12 +127,9 @@ def _findings(layout, settings, found) -> None:
         chosen = number == settings.finding
         count = finding["count"]
         times = f"  ({count})" if count > 1 else ""
-        layout.operator(
-            "mu.print_show",
-            text=f"{finding['check'].capitalize()}{times}{_measure(finding)}",
-            icon=ICONS[finding["severity"]],
-            depress=chosen,
-        ).finding = number
+        text = f"{finding['check'].capitalize()}{times}{_measure(finding)}"
+        icon = ICONS[finding["severity"]]
+        layout.operator("mu.print_show", text=text, icon=icon, depress=chosen).finding = number
         if chosen:
             _in_full(layout.box(), number, settings.place, finding)
     body = fold(layout, "MU_passed", f"{len(passed)} checks passed", icon="CHECKMARK")
@@ -266,12 +263,12 @@ class MU_PT_print_files(_OfPrint, bpy.types.Panel):
             if settings.formats & {"3mf-beams", "step"}:
                 wrapped(layout, "Beams and STEP have no vents", "INFO")
         path = root.mu_unit.path
-        wrapped(
-            layout,
-            f"Waveguide along {path_symbol(path)}" if path else "Without a waveguide: no path chosen",
-            "INFO",
-        )
-        _check_state(layout, found)
+        along = f"Waveguide along {path_symbol(path)}" if path else "Without a waveguide: no path chosen"
+        wrapped(layout, along, "INFO")
+        if found is None or found.stale:
+            wrapped(layout, f"Not checked: {found.stale}" if found else "Not checked", "QUESTION")
+        else:
+            _verdict(layout, found, "export asks first")
         words = printing.EXPORT.label(root, "Export")
         large_button(layout, "mu.print_export", "EXPORT", root=root, text=words)
         _state(layout, root, printing.EXPORT)
@@ -305,9 +302,8 @@ class MU_PT_print_file(_OfPrint, bpy.types.Panel):
         box, found = layout.box(), shown.content
         for finding in found["findings"]:
             if finding["severity"] in marks.FAULTS:
-                wrapped(
-                    box, f"{finding['check'].capitalize()}: {finding['what']}", ICONS[finding["severity"]]
-                )
+                words = f"{finding['check'].capitalize()}: {finding['what']}"
+                wrapped(box, words, ICONS[finding["severity"]])
         if found["verdict"] == "pass":
             wrapped(box, "Every check passed", ICONS["pass"])
         if "repair" in found:
@@ -319,24 +315,14 @@ class MU_PT_print_file(_OfPrint, bpy.types.Panel):
         row.operator("mu.print_open", text="", icon="FILE_FOLDER").what = "check-file"
 
 
-def _check_state(layout, found) -> None:
-    """Result of the check of the unit that is to be exported."""
-    if found is None or found.stale:
-        wrapped(layout, f"Not checked: {found.stale}" if found else "Not checked", "QUESTION")
-    else:
-        _verdict(layout, found, "export asks first")
-
-
 def _verdict(layout, found, then: str) -> None:
     """Draw what a check found, in a line; then: what follows from errors."""
     count = {s: sum(f["severity"] == s for f in found.content["findings"]) for s in marks.FAULTS}
     if count["error"]:
         alert(layout, f"The check found {counted(count['error'], 'error', 'errors')}: {then}", "CANCEL")
     else:
-        doubts = (
-            f", {counted(count['warning'], 'warning', 'warnings')} to decide on" if count["warning"] else ""
-        )
-        wrapped(layout, f"Checked: no errors{doubts}", "CHECKMARK")
+        doubts = f", {counted(count['warning'], 'warning', 'warnings')} to decide on"
+        wrapped(layout, f"Checked: no errors{doubts if count['warning'] else ''}", "CHECKMARK")
 
 
 def _written(layout, found) -> None:
@@ -355,11 +341,8 @@ def _written(layout, found) -> None:
     for entry in found.content["files"]:
         column.label(text=f"{entry['file']}, {entry['bytes'] / 1e6:.2f} MB", icon="CHECKMARK")
     if vented := found.content["vents"]:
-        count, before, after = (
-            len(vented["vents"]),
-            vented["trapped_before_ml"],
-            vented["trapped_after_ml"],
-        )
+        count = len(vented["vents"])
+        before, after = (vented[f"trapped_{when}_ml"] for when in ("before", "after"))
         words = f"{counted(count, 'vent', 'vents')}: {_ml(before)} trapped before, {_ml(after)} after"
         wrapped(column, words if count else f"No vent is needed: {_ml(before)} trapped at most", "INFO")
     for entry in found.content["refused"]:

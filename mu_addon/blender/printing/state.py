@@ -60,6 +60,7 @@ PRINTING = JobKind(
 _printers: FileCache[Printer] = FileCache()
 _measured: FileCache[dict[str, Limit]] = FileCache()
 _own: FileCache[tuple[list[str], list[float]]] = FileCache()
+_shipped = cache(load_printer)
 
 
 def printer_of(root: Any) -> Printer:
@@ -84,11 +85,6 @@ def _printer(root: Any) -> Printer:
     return _printers.read([Path(path)], lambda: load_printer(path)) or load_printer(path)
 
 
-@cache
-def _shipped(name: str) -> Printer:
-    return load_printer(name)
-
-
 def path_of(root: Any, unit: Unit) -> str:
     """Name of the window that the waveguide follows, or ""; raises InputError for muted steps."""
     given = stack.given(root, unit)
@@ -98,7 +94,7 @@ def path_of(root: Any, unit: Unit) -> str:
 
 def own_body(root: Any) -> bool:
     """Return True if a user-defined body replaces the lattice's box."""
-    return bool(envelope.fingerprint(root))
+    return root.mu_unit.envelope is not None
 
 
 def along(root: Any, unit: Unit) -> Window | None:

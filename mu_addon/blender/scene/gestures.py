@@ -66,7 +66,7 @@ def look(*_: Any) -> None:
             if root.mu_unit.show == unit_object.RESULT and not unit_object.shows_result(root):
                 motion.fall_back(root)
             if root in copies or _damaged(root):
-                _rebuild(root)
+                (preview_update.schedule if root.mu_unit.uuid else gripper_object.rebuild)(root)
     finally:
         _looking = False
 
@@ -214,13 +214,6 @@ def _damaged(root: Any) -> bool:
     there = [child.get(displays.PART) for child in root.children]
     wanted = [CANDIDATE + window.name for window in windows(props.chambers.count)]
     return sorted(name for name in there if name in wanted) != sorted(wanted)
-
-
-def _rebuild(root: Any) -> None:
-    if root.mu_unit.uuid:
-        preview_update.schedule(root)
-    else:
-        gripper_object.rebuild(root)
 
 
 @handler("depsgraph_update_post")

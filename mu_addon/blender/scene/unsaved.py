@@ -6,6 +6,7 @@ to the file, which stores a relative path. Saving elsewhere leaves them in place
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
@@ -25,11 +26,11 @@ _homes: dict[str, Path] = {}
 """By UUID: folders of units and grippers before the file was saved."""
 
 
-def _owners() -> list[tuple[Any, Any, Any, Path]]:
-    """Object, owner of its UUID, owner of its folder's name, and that folder, of every unit and gripper."""
-    units = [(r, r.mu_unit, r.mu_unit.study, studies.folder_of(r)) for r in unit_object.roots()]
-    grippers = [(r, r.mu_gripper, r.mu_gripper, grasps.folder_of(r)) for r in gripper_object.roots()]
-    return [owner for owner in (*units, *grippers) if owner[2].folder]
+def _owners() -> list[tuple[Any, Any, Path]]:
+    """Object, owner of its folder's name, and that folder, of every unit and gripper with one."""
+    units = [(root, root.mu_unit.study, studies.folder_of(root)) for root in unit_object.roots()]
+    grippers = [(root, root.mu_gripper, grasps.folder_of(root)) for root in gripper_object.roots()]
+    return [owner for owner in (*units, *grippers) if owner[1].folder]
 
 
 @handler("save_pre")
@@ -39,22 +40,20 @@ def _before_save(path: str = "", *_: Any) -> None:
     if not isinstance(path, str) or not path:
         return
     blend = Path(bpy.path.abspath(path))
-    for root, props, named, home in _owners():
+    for root, named, home in _owners():
         if home.parent == user_folder("studies"):
             home = _moved(root, home, blend)
-        _homes[props.uuid] = home
+        _homes[displays.uuid_of(root)] = home
         named.folder = _way(home, blend)
 
 
 @handler("save_post")
 def _after_save(*_: Any) -> None:
     # A copy is saved elsewhere, and this file keeps its path.
-    for _root, props, named, _home in _owners():
-        home = _homes.get(props.uuid)
-        if home is not None:
-            way = studies.relative(home)
-            if named.folder != way:
-                named.folder = way
+    for root, named, _home in _owners():
+        home = _homes.get(displays.uuid_of(root))
+        if home is not None and named.folder != (way := studies.relative(home)):
+            named.folder = way
     _homes.clear()
 
 
@@ -67,12 +66,9 @@ def _moved(root: Any, old: Path, blend: Path) -> Path:
     except MuError:
         # The file is saved all the same; the runs stay in place and are found there.
         return old
-    for part in root.children:
-        modifier = _cache_of(part)
-        if modifier is not None:
-            played = Path(bpy.path.abspath(modifier.filepath))
-            if played.is_relative_to(old):
-                modifier.filepath = str(new / played.relative_to(old))
+    for _part, modifier, played in _caches(root):
+        if played.is_relative_to(old):
+            modifier.filepath = str(new / played.relative_to(old))
     return new
 
 
@@ -88,11 +84,9 @@ def _way(home: Path, blend: Path) -> str:
 def _loaded(*_: Any) -> None:
     """Find point caches whose path has changed with the file, in the folder of their run."""
     for root in (*unit_object.roots(), *gripper_object.roots()):
-        for part in root.children:
-            modifier = _cache_of(part)
-            if modifier is None or Path(bpy.path.abspath(modifier.filepath)).is_file():
+        for part, modifier, before in _caches(root):
+            if before.is_file():
                 continue
-            before = Path(bpy.path.abspath(modifier.filepath))
             if root.mu_gripper.uuid:
                 found = grasps.folder_of(root) / before.parent.name / before.name
             else:
@@ -101,10 +95,12 @@ def _loaded(*_: Any) -> None:
                 modifier.filepath = studies.relative(found)
 
 
-def _cache_of(part: Any) -> Any:
-    """Modifier that plays a part of a run's motion, or None."""
-    found = part.modifiers.get("Motion")
-    return found if found is not None and found.type == "MESH_CACHE" else None
+def _caches(root: Any) -> Iterator[tuple[Any, Any, Path]]:
+    """Parts that play a run's motion, with the modifier that plays it, and its file."""
+    for part in root.children:
+        found = part.modifiers.get("Motion")
+        if found is not None and found.type == "MESH_CACHE":
+            yield part, found, Path(bpy.path.abspath(found.filepath))
 
 
 @at_end

@@ -46,11 +46,8 @@ class MU_PT_sensor(UnitPanel, bpy.types.Panel):
         if session is not None:
             _session(layout, root.mu_sensor, session)
         if sensor.others(root):
-            wrapped(
-                layout,
-                f"{counted(len(sensor.others(root)), 'sensor', 'sensors')} of other units connected",
-                "INFO",
-            )
+            count = counted(len(sensor.others(root)), "sensor", "sensors")
+            wrapped(layout, f"{count} of other units connected", "INFO")
             layout.operator("mu.sensor_disconnect", text="Disconnect Them", icon="UNLINKED").others = True
         _plot(layout, root.mu_sensor, session)
         _calibration(layout, root, session)
@@ -64,9 +61,8 @@ def _source(layout, settings):
         row.prop(settings, "port")
         row.operator("mu.sensor_ports", text="", icon="FILE_REFRESH")
         for name, words in sensor.known_ports():
-            layout.operator(
-                "mu.sensor_port", text=words, icon="CHECKMARK" if name == settings.port else "BLANK1"
-            ).name = name
+            icon = "CHECKMARK" if name == settings.port else "BLANK1"
+            layout.operator("mu.sensor_port", text=words, icon=icon).name = name
         layout.prop(settings, "baud")
     elif settings.source == "replay":
         layout.prop(settings, "replay")
@@ -79,12 +75,8 @@ def _session(layout, settings, session):
     if session.running:
         row = layout.row(align=True)
         row.operator("mu.sensor_disconnect", icon="UNLINKED")
-        paused = session.state == "paused"
-        row.operator(
-            "mu.sensor_pause",
-            text="Open Port" if paused else "Release Port",
-            icon="PLAY" if paused else "PAUSE",
-        )
+        text, icon = ("Open Port", "PLAY") if session.state == "paused" else ("Release Port", "PAUSE")
+        row.operator("mu.sensor_pause", text=text, icon=icon)
     box = layout.box()
     words, icon = STATES.get(session.state, (session.state, "INFO"))
     if session.child.state == FAILED:
@@ -95,11 +87,8 @@ def _session(layout, settings, session):
         wrapped(box, "The recording is kept. Connect again")
     elif session.running and session.watched.silent_s > sensor.SILENT_S and status:
         box.alert = True
-        wrapped(
-            box,
-            f"No status for {session.watched.silent_s:.0f} s: does the folder still exist?",
-            "ERROR",
-        )
+        silent = f"{session.watched.silent_s:.0f} s"
+        wrapped(box, f"No status for {silent}: does the folder still exist?", "ERROR")
     else:
         if session.state == "connected" and not session.fresh:
             words, icon = "Connected, no samples", "ERROR"
@@ -166,12 +155,8 @@ def _calibration(layout, root, session):
     if found is not None:
         low, high = found.range_deg
         zeroed = "" if found.gain == 1.0 else f", light {100 * (found.gain - 1):+.1f} % since"
-        wrapped(
-            body,
-            f"{low:.0f} to {high:.0f}°, {found.sweeps} sweeps, {found.error_deg:.2f}° rms "
-            f"cross-validated{zeroed}",
-            "CHECKMARK",
-        )
+        error = f"{found.error_deg:.2f}° rms cross-validated"
+        wrapped(body, f"{low:.0f} to {high:.0f}°, {found.sweeps} sweeps, {error}{zeroed}", "CHECKMARK")
     else:
         wrapped(body, trouble or "Not calibrated: voltages only", "ERROR" if trouble else "INFO")
     light, dark = sensor.chosen(root)
@@ -231,9 +216,8 @@ def _twin(layout, root):
     if not body:
         return
     on = bool(twin.parts(root))
-    body.operator(
-        "mu.sensor_twin", text="Hide Twin" if on else "Show Twin", icon="MOD_SIMPLEDEFORM", depress=on
-    ).on = not on
+    text = "Hide Twin" if on else "Show Twin"
+    body.operator("mu.sensor_twin", text=text, icon="MOD_SIMPLEDEFORM", depress=on).on = not on
     if on:
         state, words = twin.status(root)
         if state == twin.OUTSIDE:

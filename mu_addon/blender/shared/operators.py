@@ -61,19 +61,16 @@ def reports_errors(execute):
     @wraps(execute)
     def reported(self, context):
         try:
-            with _called_by(script=not self.options.is_invoke):
-                return execute(self, context)
-        except NotReady as wanted:
-            owner = displays.uuid_of(wanted.root)
             try:
+                with _called_by(script=not self.options.is_invoke):
+                    return execute(self, context)
+            except NotReady as wanted:
+                owner = displays.uuid_of(wanted.root)
                 wanted.begin(partial(_again, owner, self.bl_idname, self.as_keywords()))
-            except MuError as error:
-                self.report({"ERROR"}, in_panel(str(error)))
-            # Without an undo step: that comes with what is made.
-            return {"CANCELLED"}
         except MuError as error:
             self.report({"ERROR"}, in_panel(str(error)))
-            return {"CANCELLED"}
+        # Without an undo step: that of a slow part comes with what is made.
+        return {"CANCELLED"}
 
     return reported
 
@@ -217,14 +214,9 @@ def open_file(context, path: Path) -> None:
     elif path.suffix == ".html":
         bpy.ops.wm.url_open(url=path.as_uri())
     else:
-        _show_text(context, path)
-
-
-def _show_text(context, path: Path) -> None:
-    """Load a file as a text of Blender's, and show it if a text editor is open."""
-    name = f"MU {path.name}"
-    text = bpy.data.texts.get(name) or bpy.data.texts.new(name)
-    text.from_string(path.read_text(encoding="utf-8", errors="replace"))
-    for area in context.screen.areas if context.screen else ():
-        if area.type == "TEXT_EDITOR":
-            area.spaces.active.text = text
+        name = f"MU {path.name}"
+        text = bpy.data.texts.get(name) or bpy.data.texts.new(name)
+        text.from_string(path.read_text(encoding="utf-8", errors="replace"))
+        for area in context.screen.areas if context.screen else ():
+            if area.type == "TEXT_EDITOR":
+                area.spaces.active.text = text

@@ -39,9 +39,3 @@ def shown_factor(obj: Any, scene: Any) -> float:
     """Ratio of an object's displayed size in a scene to its true one, along its worst axis."""
     factors = [float(f) / mm(scene) for f in obj.matrix_world.to_scale()]
     return max(factors, key=lambda f: abs(np.log(max(abs(f), 1e-12))))
-
-
-def use_millimetres(scene: Any) -> None:
-    """Set one Blender unit to a millimetre, shown as such."""
-    units = scene.unit_settings
-    units.system, units.scale_length, units.length_unit = "METRIC", 0.001, "MILLIMETERS"

@@ -7,7 +7,6 @@ import textwrap
 from typing import Any
 
 from ...design import figures as core
-from ...design.printing.printer import Printer
 from ...errors import MuError
 from ...reading import parse_json
 from ...run.progress import spell
@@ -64,19 +63,14 @@ def _made(root: Any, current: bool) -> list[str]:
     printer = printing.printer_of(root)
     struts = stack.STACK.value("struts", stack.given(root, unit))
     found = core.figures(unit, printer, struts, _volume(root) if current else None)
-    about = "about " if found.approximate else ""
+    about, limit = "about " if found.approximate else "", printer.limits["layer_s"]
     return [
         f"Size {' x '.join(f'{side:.3g}' for side in found.size_mm)} mm",
         f"Resin {about}{found.mass_g:.3g} g, {found.volume_mm3 / 1000.0:.3g} ml",
         f"Prints upright in about {spell(found.print_s)}",
-        _assumed(printer),
+        f"at {limit.value:g} s a layer{', assumed' if limit.assumed else ''}",
     ]
 
 
 def _volume(root: Any) -> float:
     return float(parse_json(root.mu_unit.solid["mu_gates"], "mu_gates")["volume_mm3"])
-
-
-def _assumed(printer: Printer) -> str:
-    limit = printer.limits["layer_s"]
-    return f"at {limit.value:g} s a layer{', assumed' if limit.assumed else ''}"

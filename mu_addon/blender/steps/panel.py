@@ -58,8 +58,5 @@ class MU_PT_stack(UnitPanel, bpy.types.Panel):
             row.operator("mu.again", icon="FILE_REFRESH").step = step.name
         lacking = stack.muted(props)
         if lacking:
-            wrapped(
-                layout,
-                f"Cannot be printed while muted: {', '.join(s for s in STEPS if s in lacking)}",
-                "INFO",
-            )
+            names = ", ".join(name for name in STEPS if name in lacking)
+            wrapped(layout, f"Cannot be printed while muted: {names}", "INFO")

@@ -1,7 +1,5 @@
 """Convert a clip of the Movie Clip Editor to an experiment in a folder of measured data."""
 
-# Blender reads the annotations themselves: no `from __future__ import annotations` here.
-
 from pathlib import Path
 
 import bpy
@@ -10,7 +8,7 @@ from ...errors import InputError
 from ...studies.track import Track
 from ..jobs.here import run_here
 from ..shared.blender_property import Text
-from ..shared.operators import RootOperator, operator, reports_errors, unless
+from ..shared.operators import FreeOperator, RootOperator, operator, unless
 from ..unit import object as unit_object
 from . import properties as bench
 from . import state as tracking
@@ -46,38 +44,37 @@ def track(operator, context, clip):
     bpy.ops.clip.track_markers(how, backwards=False, sequence=True)
 
 
-class MU_OT_track_write(bpy.types.Operator):
-    """Write angle, positions and pressure over time into a folder of measured data"""
-
-    bl_label = "Write Measured Data"
-    bl_options = {"REGISTER", "UNDO"}
-
-    clip: Text("Clip", "Name of a clip of this file. Empty: the one in the editor", options={"SKIP_SAVE"})
-
+class _OfCompleteClip(FreeOperator):
     @classmethod
     def poll(cls, context):
         clip = clip_of(context)
-        if clip is not None and bench.missing(clip):
-            cls.poll_message_set(bench.missing(clip))
-            return False
-        return True
+        lacks = "" if clip is None else bench.missing(clip)
+        if lacks:
+            cls.poll_message_set(lacks)
+        return not lacks
 
-    @reports_errors
-    def execute(self, context):
-        clip = bpy.data.movieclips.get(self.clip) if self.clip else clip_of(context)
-        if clip is None:
-            raise InputError(f"There is no clip {self.clip!r}" if self.clip else NO_CLIP)
-        study = Track(
-            clip=Path(clip.name),
-            bench=bench.bench_of(clip),
-            pressure=Path(bpy.path.abspath(clip.mu_bench.pressure)),
-            followed=tracking.tracks_of(clip),
-        )
-        work, warnings = run_here(study, Path(bpy.path.abspath(clip.mu_bench.folder)))
-        for warning in warnings:
-            self.report({"WARNING"}, warning["what"])
-        self.report({"INFO"}, ". ".join(work.lines))
-        root = unit_object.active_root(context)
-        if root is not None and not root.mu_evidence.folder:
-            root.mu_evidence.folder = clip.mu_bench.folder
-        return {"FINISHED"}
+
+@operator(
+    _OfCompleteClip,
+    "Write Measured Data",
+    clip=Text("Clip", "Name of a clip of this file. Empty: the one in the editor", options={"SKIP_SAVE"}),
+)
+def track_write(operator, context, clip):
+    """Write angle, positions and pressure over time into a folder of measured data"""
+    found = bpy.data.movieclips.get(clip) if clip else clip_of(context)
+    if found is None:
+        raise InputError(f"There is no clip {clip!r}" if clip else NO_CLIP)
+    settings = found.mu_bench
+    study = Track(
+        clip=Path(found.name),
+        bench=bench.bench_of(found),
+        pressure=Path(bpy.path.abspath(settings.pressure)),
+        followed=tracking.tracks_of(found),
+    )
+    work, warnings = run_here(study, Path(bpy.path.abspath(settings.folder)))
+    for warning in warnings:
+        operator.report({"WARNING"}, warning["what"])
+    operator.report({"INFO"}, ". ".join(work.lines))
+    root = unit_object.active_root(context)
+    if root is not None and not root.mu_evidence.folder:
+        root.mu_evidence.folder = settings.folder

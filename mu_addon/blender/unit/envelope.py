@@ -20,13 +20,11 @@ def envelope_in(root: Any, unit: Unit) -> Body | None:
     mesh = root.mu_unit.envelope
     if mesh is None:
         return None
-    vertices, triangles = arrays_in(mesh)
-    digest = hashlib.sha256(vertices.tobytes() + triangles.tobytes()).hexdigest()
-    key = digest, repr((unit.scale, unit.chambers))
+    key = fingerprint(root), repr((unit.scale, unit.chambers))
     if key not in _kept:
         if len(_kept) > 16:
             _kept.clear()
-        _kept[key] = envelope(body_of(vertices, triangles, mesh.name), unit.dimensions)
+        _kept[key] = envelope(body_of(*arrays_in(mesh), mesh.name), unit.dimensions)
     return _kept[key]
 
 

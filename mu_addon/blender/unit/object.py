@@ -225,9 +225,7 @@ def put_solid(root: Any, solid: Any, unit: Unit) -> Any:
     mesh = bpy.data.meshes.new(f"{root.name} solid")
     skeletons.write(mesh, skeletons.Skeleton(solid.vertices, faces=(solid.triangles,)))
     materials.assign(mesh, "MU Solid")
-    mesh["mu_unit_hash"] = shape_hash(unit)
-    mesh["mu_path"] = solid.window.name if solid.window else ""
-    mesh["mu_body"] = envelope.fingerprint(root)
+    mesh["mu_unit_hash"], mesh["mu_path"], mesh["mu_body"] = _of_solid(root, unit, solid.window)
     mesh["mu_quality"] = solid.quality
     mesh["mu_gates"] = json.dumps(attrs.asdict(solid.gates))
     # A shown one is removed by `show`, after which its users must not be read.
@@ -249,6 +247,10 @@ def solid_is_current(root: Any) -> bool:
         unit = to_unit(root.mu_unit)
     except InputError:
         return False
-    window = chosen_window(root, unit)
-    now = shape_hash(unit), window.name if window else "", envelope.fingerprint(root)
-    return now == (mesh["mu_unit_hash"], mesh["mu_path"], mesh.get("mu_body", ""))
+    made_of = mesh["mu_unit_hash"], mesh["mu_path"], mesh["mu_body"]
+    return made_of == _of_solid(root, unit, chosen_window(root, unit))
+
+
+def _of_solid(root: Any, unit: Unit, window: Window | None) -> tuple[str, str, str]:
+    """What a solid is made of: hash of the unit, path of its waveguide, and the user's body."""
+    return shape_hash(unit), window.name if window else "", envelope.fingerprint(root)

@@ -1,7 +1,5 @@
 """Add, rebuild and delete a unit; give the scene millimetres."""
 
-# Blender reads the annotations themselves: no `from __future__ import annotations` here.
-
 import attrs
 import bpy
 from bpy.props import StringProperty
@@ -13,7 +11,7 @@ from ...design.settings import PRESET
 from ...errors import InputError
 from ..shared import landing, scene_units, updates, viewports
 from ..shared.blender_property import Choice, Flag, Number, Text, exact, listed
-from ..shared.operators import FreeOperator, operator, reports_errors
+from ..shared.operators import FreeOperator, operator
 from ..shared.wording import label, tooltip
 from . import object as unit_object
 from . import presets
@@ -26,8 +24,8 @@ _SCALE = next(d for d in describe(Unit) if d.name == "scale")
 
 def _use_millimetres(context) -> None:
     """Give the scene millimetres; our objects, cursor and views keep their true sizes and positions."""
-    before = scene_units.mm(context.scene)
-    scene_units.use_millimetres(context.scene)
+    before, units = scene_units.mm(context.scene), context.scene.unit_settings
+    units.system, units.scale_length, units.length_unit = "METRIC", 0.001, "MILLIMETERS"
     factor = scene_units.mm(context.scene) / before
     if abs(factor - 1.0) < 1e-6:
         return
@@ -44,40 +42,33 @@ def _presets() -> list[tuple[str, str, str]]:
     ]
 
 
-class MU_OT_add(bpy.types.Operator):
-    """Add a Monolithic Unit: bladder actuator, lattice and sensor path in one body"""
-
-    bl_label = "Monolithic Unit"
-    bl_options = {"REGISTER", "UNDO"}
-
-    preset: Choice("Preset", "Unit to begin with", items=listed(_presets), options={"SKIP_SAVE"})
-    scale: Number("Scale", tooltip(_SCALE), default=0.0, min=0.0, max=_SCALE.high, options={"SKIP_SAVE"})
-    millimetres: Flag(
-        "Scene in Millimetres",
-        "Also set the scene's unit of length, one Blender unit a millimetre",
-        default=False,
-    )
+@operator(
+    FreeOperator,
+    "Monolithic Unit",
+    preset=Choice("Preset", "Unit to begin with", items=listed(_presets), options={"SKIP_SAVE"}),
+    scale=Number("Scale", tooltip(_SCALE), default=0.0, min=0.0, max=_SCALE.high, options={"SKIP_SAVE"}),
+    millimetres=Flag(
+        "Scene in Millimetres", "Also set the scene's unit of length, one Blender unit a millimetre"
+    ),
     # The preset that the scale belongs to: another one chosen in the redo panel sets its own scale.
-    scaled: StringProperty(options={"HIDDEN", "SKIP_SAVE"})
-    frame: Flag("Frame in View", "Bring the new unit into view", default=True)
-
-    @reports_errors
-    def execute(self, context):
-        if not self.properties.is_property_set("preset"):
-            self.preset = PRESET
-        core = presets.load(self.preset)
-        if not self.properties.is_property_set("scale") or self.scaled not in ("", self.preset):
-            self.scale = core.scale
-        self.scaled = self.preset
-        if exact(self.scale) != core.scale:
-            core = attrs.evolve(core, scale=max(exact(self.scale), _SCALE.low))
-        if self.millimetres:
-            _use_millimetres(context)
-        root = unit_object.create(context, core)
-        landing.land(context, root)
-        if self.frame:
-            viewports.frame_selected(context)
-        return {"FINISHED"}
+    scaled=StringProperty(options={"HIDDEN", "SKIP_SAVE"}),
+    frame=Flag("Frame in View", "Bring the new unit into view", default=True),
+)
+def add(operator, context, millimetres, frame):
+    """Add a Monolithic Unit: bladder actuator, lattice and sensor path in one body"""
+    if not operator.properties.is_property_set("preset"):
+        operator.preset = PRESET
+    core = presets.load(operator.preset)
+    if not operator.properties.is_property_set("scale") or operator.scaled not in ("", operator.preset):
+        operator.scale = core.scale
+    operator.scaled = operator.preset
+    if exact(operator.scale) != core.scale:
+        core = attrs.evolve(core, scale=max(exact(operator.scale), _SCALE.low))
+    if millimetres:
+        _use_millimetres(context)
+    landing.land(context, unit_object.create(context, core))
+    if frame:
+        viewports.frame_selected(context)
 
 
 @operator(UnitOperator, "Rebuild Unit")

@@ -22,11 +22,6 @@ def names() -> list[str]:
     return [*preset_names(), *(USER + path.stem for path in sorted(_folder().glob("*.toml")))]
 
 
-def is_named_after_one(name: str) -> bool:
-    """Return True if an object has a preset's name, also with the number of a duplicate name."""
-    return re.sub(r"\.\d{3,}$", "", name) in {known.removeprefix(USER) for known in names()}
-
-
 def load(name: str) -> Unit:
     """The unit of that preset; raises InputError."""
     return read_unit(_file(name)) if name.startswith(USER) else load_preset(name)
@@ -67,7 +62,8 @@ def _folder() -> Path:
 def preset_load(root, name):
     """Set every parameter of the unit to those of a preset"""
     core = load(name)
-    if not is_named_after_one(root.name):
+    # Without the number of a duplicate name.
+    if re.sub(r"\.\d{3,}$", "", root.name) not in {known.removeprefix(USER) for known in names()}:
         core = attrs.evolve(core, name=root.mu_unit.title)  # the user's own name stays
     unit_object.take(root, core)
 

@@ -3,6 +3,7 @@
 import bpy
 import numpy as np
 
+from mu_addon.blender.results import runs
 from mu_addon.blender.unit import object as unit_object
 from mu_addon.blender.unit.drawing import PARTS
 
@@ -11,6 +12,15 @@ def add(**settings):
     """Add a unit, to a scene in millimetres unless said otherwise; returns its object."""
     assert bpy.ops.mu.add(**{"millimetres": True, **settings}) == {"FINISHED"}
     return unit_object.active_root(bpy.context)
+
+
+def with_runs(home):
+    """A unit that shows the runs in a folder."""
+    root = add(preset="mu-0.75x")
+    root.mu_unit.study.folder = str(home)
+    unit_object.rebuild(root)
+    runs.refresh()
+    return root
 
 
 def attribute(root, name):

@@ -8,12 +8,11 @@ import numpy as np
 import pytest
 from mathutils import Matrix
 
-from mu_addon.blender.results import runs
 from mu_addon.blender.scene import handles
 from mu_addon.blender.unit import object as unit_object
 from mu_addon.blender.unit.properties import to_unit
 
-from .acting import add, points_of
+from .acting import add, points_of, with_runs
 
 SIZES = ("wall", "bladder", "cell")
 
@@ -92,10 +91,7 @@ def test_a_drag_sets_true_millimetres_and_esc_puts_them_back(what, moved, sectio
 
 
 def test_the_pressure_goes_to_its_frame(home):
-    root = add(preset="mu-0.75x")
-    root.mu_unit.study.folder = str(home)
-    unit_object.rebuild(root)
-    runs.refresh()
+    root = with_runs(home)
     assert not handles.usable(root, "pressure")
     assert all(handles.usable(root, name) for name in SIZES)
     assert bpy.ops.mu.field_show(field="displacement_mm") == {"FINISHED"}

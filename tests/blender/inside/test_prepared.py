@@ -8,11 +8,10 @@ import pytest
 
 from mu_addon.blender.jobs import prepared, start_child
 from mu_addon.blender.results import motion as motion_parts
-from mu_addon.blender.results import runs
 from mu_addon.blender.simulate import study_folder as studies
 from mu_addon.blender.unit import object as unit_object
 
-from .acting import add
+from .acting import add, with_runs
 from .jobs import PATIENCE_S
 
 
@@ -73,10 +72,7 @@ def test_what_cannot_be_made_is_said(monkeypatch, tmp_path):
 
 @pytest.mark.nightly("test_a_solid_is_made_elsewhere_and_is_the_same")
 def test_a_difference_and_a_print_that_moves_are_made_elsewhere(home, monkeypatch):
-    root = add(preset="mu-0.75x")
-    root.mu_unit.study.folder = str(home)
-    unit_object.rebuild(root)
-    runs.refresh()
+    root = with_runs(home)
     thick = next(r.key for r in studies.runs_of(root) if r.unit.chambers.wall_mm > 1)
     assert bpy.ops.mu.run_compare(key=thick) == {"FINISHED"}
 

@@ -12,7 +12,6 @@ from mu_addon.blender.jobs import start_child as jobs
 from mu_addon.blender.printing import layer, marks
 from mu_addon.blender.printing import panel as print_panel
 from mu_addon.blender.printing import state as printing
-from mu_addon.blender.results import runs
 from mu_addon.blender.sidebar import unit_panel
 from mu_addon.blender.simulate import study_folder as studies
 from mu_addon.blender.simulate import timings
@@ -23,7 +22,7 @@ from mu_addon.design.profile import cavity_polygon
 from mu_addon.design.surface import bad_edges, stl_bytes, stl_surface
 from mu_addon.studies.export import FORMATS, MANIFEST
 
-from .acting import add, refused
+from .acting import add, refused, with_runs
 from .drawing import drawn as drawn_by
 from .jobs import ended, fake
 
@@ -237,10 +236,7 @@ def test_markers_lead_to_every_place_and_undo_takes_them_back(tmp_path):
 def test_the_next_step_goes_from_the_ranking_to_the_files(home, tmp_path, monkeypatch):
     """The button at the top, each step once the one before it is done; with what was measured here."""
     monkeypatch.setattr(timings, "_file", lambda: tmp_path / "timings.json")
-    root = add(preset="mu-0.75x")
-    root.mu_unit.study.folder = str(home)
-    unit_object.rebuild(root)
-    runs.refresh()
+    root = with_runs(home)
 
     def step():
         return drawn_by([unit_panel.MU_PT_unit])

@@ -18,18 +18,10 @@ from mu_addon.blender.results import motion as motion_parts
 from mu_addon.blender.simulate import study_folder as studies
 from mu_addon.blender.unit import object as unit_object
 
-from .acting import add, refused
+from .acting import add, refused, with_runs
 from .drawing import drawn
 
 PANELS = [panel.MU_PT_results, run_panel.MU_PT_comparison, panel.MU_PT_motion, panel.MU_PT_field]
-
-
-def started(home):
-    root = add(preset="mu-0.75x")
-    root.mu_unit.study.folder = str(home)
-    unit_object.rebuild(root)
-    runs.refresh()
-    return root
 
 
 def keys(root):
@@ -43,7 +35,7 @@ def caches(root):
 
 
 def test_a_small_run_replaces_no_large_one_and_undoing_a_parameter_finds_its_run(home):
-    root = started(home)
+    root = with_runs(home)
     full, coarse, thick = keys(root)
     listed = bpy.context.window_manager.mu_runs
     assert [entry.key for entry in listed.entries] == [thick, coarse, full], "the latest first"
@@ -76,7 +68,7 @@ def test_a_small_run_replaces_no_large_one_and_undoing_a_parameter_finds_its_run
 
 
 def test_a_click_on_a_run_moves_nothing_above_it(home):
-    root = started(home)
+    root = with_runs(home)
     above = []
     for key in keys(root):
         assert bpy.ops.mu.run_show(key=key) == {"FINISHED"}
@@ -88,7 +80,7 @@ def test_a_click_on_a_run_moves_nothing_above_it(home):
 
 
 def test_how_near_to_tearing_and_what_is_doubtful_stand_with_the_results(home):
-    root = started(home)
+    root = with_runs(home)
     path = studies.findings(root).run.folder / "summary.json"
     assert not panel.MU_PT_warnings.poll(bpy.context)
     summary = json.loads(path.read_text(encoding="utf-8"))
@@ -102,7 +94,7 @@ def test_how_near_to_tearing_and_what_is_doubtful_stand_with_the_results(home):
 
 
 def test_what_is_shown_on_the_unit_follows_the_run(home):
-    root = started(home)
+    root = with_runs(home)
     full, _, thick = keys(root)
     assert bpy.ops.mu.field_show(field="displacement_mm") == {"FINISHED"}
     assert all(path.parents[2].name == full for path in caches(root))
@@ -122,7 +114,7 @@ def test_a_run_that_was_stopped_says_so_in_the_room_there_is():
 
 
 def test_names_and_stars_are_kept_with_the_run(home):
-    root = started(home)
+    root = with_runs(home)
     entry = bpy.context.window_manager.mu_runs.entries[2]
     assert entry.title == "Ranking"
     entry.title, entry.starred = "as printed", True
@@ -136,7 +128,7 @@ def test_names_and_stars_are_kept_with_the_run(home):
 
 
 def test_two_runs_side_by_side_and_as_a_difference_on_the_unit(home):
-    root = started(home)
+    root = with_runs(home)
     full, coarse, thick = keys(root)
     assert "is the one that is shown" in refused(bpy.ops.mu.run_compare, key=full)
     assert "Compare with another run" in refused(bpy.ops.mu.field_show, field="run_difference_mm")
@@ -164,7 +156,7 @@ def test_two_runs_side_by_side_and_as_a_difference_on_the_unit(home):
 
 
 def test_a_run_that_is_compared_with_itself_shows_no_difference(home):
-    root = started(home)
+    root = with_runs(home)
     _, _, thick = keys(root)
     assert bpy.ops.mu.run_compare(key=thick) == {"FINISHED"}
     assert bpy.ops.mu.field_show(field="run_difference_mm") == {"FINISHED"}
@@ -225,7 +217,7 @@ def test_a_legend_keeps_clear_of_what_blender_draws_in_a_view_of_any_size():
 
 
 def test_candidates_are_seen_on_the_unit_at_rest_alone(home):
-    root = started(home)
+    root = with_runs(home)
     root.mu_unit.candidates = True
     assert bpy.ops.mu.motion() == {"FINISHED"}
     assert unit_object.shows_result(root)
@@ -251,7 +243,7 @@ def test_candidates_are_seen_on_the_unit_at_rest_alone(home):
 
 
 def test_deleting_a_run_frees_its_folder_and_takes_away_what_it_shows(home):
-    root = started(home)
+    root = with_runs(home)
     _, coarse, thick = keys(root)
     bpy.ops.mu.field_show(field="von_mises_kPa")
     bpy.ops.mu.run_compare(key=coarse)
@@ -307,7 +299,7 @@ def test_an_unsaved_files_runs_go_where_saving_finds_them(home, tmp_path):
 
 
 def test_the_probe_says_value_place_and_time(home):
-    root = started(home)
+    root = with_runs(home)
     assert "Show a motion first" in refused(bpy.ops.mu.probe)
     bpy.ops.mu.field_show(field="displacement_mm")
     scene, field = bpy.context.scene, "displacement_mm"
@@ -333,7 +325,7 @@ def test_the_probe_says_value_place_and_time(home):
 
 
 def test_a_field_that_the_run_has_not_is_refused_with_what_to_do(home):
-    started(home)
+    with_runs(home)
     assert "without self-contact" in refused(bpy.ops.mu.field_show, field="contact_pressure_kPa")
     # The button of a field that is not there is grey, and its tooltip says why.
     root = unit_object.active_root(bpy.context)

@@ -97,11 +97,7 @@ def _colour_field(tree) -> None:
     w.socket("Material", "Material", text="Material whose ramp reads `mu_colour`")
     value = w.attribute(w.given("Attribute"))["Attribute"]
     scaled = w.node(
-        "ShaderNodeMapRange",
-        {"clamp": True},
-        Value=value,
-        From_Min=w.given("Low"),
-        From_Max=w.given("High"),
+        "ShaderNodeMapRange", {"clamp": True}, Value=value, From_Min=w.given("Low"), From_Max=w.given("High")
     )
     stored = w.node(
         "GeometryNodeStoreNamedAttribute",
