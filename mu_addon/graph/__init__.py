@@ -15,6 +15,10 @@ if TYPE_CHECKING:
     from .definition import Input as Input
     from .definition import Output as Output
     from .definition import Setting as Setting
+    from .evaluation import CACHED as CACHED
+    from .evaluation import COMPUTED as COMPUTED
+    from .evaluation import FAILED as FAILED
+    from .evaluation import MADE as MADE
     from .evaluation import Evaluation as Evaluation
     from .evaluation import Kept as Kept
     from .evaluation import Order as Order

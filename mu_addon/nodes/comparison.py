@@ -2,8 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
-from html import escape
+from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -13,12 +12,13 @@ import numpy as np
 from ..design.parameters import stated
 from ..design.settings import USUAL_RESIN
 from ..errors import InputError
-from ..files import write_csv
 from ..graph.evaluation import Finished
 from ..materials.library import load_material
 from ..reading import is_number
-from ..report.html_parts import figure, number, table
+from ..report.html_parts import number
 from ..report.plots import BY_LENGTH, BY_START, QUIET, canvas
+from ..run.parts import Beside, Chart, Part, Table, Warn, csv, echo
+from ..run.study import Study, section
 from ..run.summary import SUMMARY, read_summary
 from ..studies.parameter_study.results import angles_of, figures
 from ..studies.starting import kind_of
@@ -26,6 +26,8 @@ from ..studies.unit_ranking import UnitStudy
 from .parts import Design
 
 Row = dict[str, Any]
+MOST = 30
+"""Characters of a value in the terminal; compare.csv has it whole."""
 
 
 @attrs.frozen(eq=False)
@@ -54,6 +56,68 @@ class Comparison:
         """Inputs that are not all equal, then all results."""
         differing = [(k, v) for k, v in self.inputs.items() if any(x != v[0] for x in v)]
         return [*differing, *self.results.items()]
+
+    def titles(self, minus: str) -> list[str]:
+        """Titles of the columns of values, then of differences."""
+        return [*self.names, *(f"{name} {minus} {self.names[0]}" for name in self.names[1:])]
+
+    def parts(self, file: str) -> Iterator[Any]:
+        """The table, a quantity a row, values, then differences to the first, as a CSV file too; charts."""
+        rows = [[name, *v, *(difference(v[0], other) for other in v[1:])] for name, v in self.rows()]
+        yield csv(file, ["quantity", *self.titles("-")], rows)
+        if self.angles and all(len(pressure) for pressure, _ in self.angles):
+            (pressure, angle), values = self.angles[0], [a for _, a in self.angles]
+            apart = [a - np.interp(p, pressure, angle) for p, a in self.angles]
+            yield Beside(
+                [
+                    Chart(
+                        lambda: _lines(self, values, "bending angle [deg]"),
+                        "Bending angle against pressure.",
+                        "Angle against pressure.",
+                    ),
+                    Chart(
+                        lambda: _lines(self, apart, "difference [deg]"),
+                        f"Angle minus that of {self.names[0]}.",
+                        f"Difference of each angle to that of {self.names[0]}.",
+                    ),
+                ],
+                across=3,
+            )
+        head = [("quantity", ""), *((name, "n") for name in self.titles("−"))]
+        yield Table("Inputs that differ, and all results.", head, rows)
+
+
+@attrs.frozen(kw_only=True, eq=False)
+class Compared(Study):
+    """Runs side by side, as `compare` shows them."""
+
+    name = "compare"
+    joins = True
+    files = {"compare.csv": "inputs that differ and all results, with differences to the first run's"}
+
+    found: Comparison
+
+    def title(self) -> str:
+        """The report's title."""
+        return f"Comparison of {', '.join(self.found.names)}"
+
+    def subtitle(self) -> str:
+        """The number of runs, and their largest angles minus the first's."""
+        return self.found.remark()
+
+    @section("compare", "Side by side")
+    def table(self) -> Iterator[Part]:
+        """The comparison, with a line of the terminal for each quantity."""
+        for name, status in self.found.unfinished:
+            yield Warn(f"the run {name} is {status}: its results are those so far", name)
+        *_, listed = parts = [*self.found.parts("compare.csv")]
+        yield from parts
+        cells = [[name, *(number(v)[:MOST] for v in values)] for name, *values in listed.rows]
+        lines = [["", *self.found.titles("-")], *cells]
+        widths = [max(map(len, column)) for column in zip(*lines, strict=True)]
+        for first, *rest in lines:
+            columns = (cell.rjust(width) for cell, width in zip(rest, widths[1:], strict=True))
+            yield from echo("  ".join([first.ljust(widths[0]), *columns]))
 
 
 def compare(items: Sequence[tuple[str, Any]]) -> Comparison:
@@ -169,47 +233,6 @@ def difference(first: Any, value: Any) -> Any:
     if is_number(first) and is_number(value):
         return value - first
     return ""
-
-
-def write_comparison(found: Comparison, path: Path) -> None:
-    """The table as CSV: a quantity a row, values, then differences to the first. Raises OutputError."""
-    more = [f"{name} - {found.names[0]}" for name in found.names[1:]]
-    rows = [
-        (quantity, *values, *(difference(values[0], v) for v in values[1:]))
-        for quantity, values in found.rows()
-    ]
-    write_csv(path, ["quantity", *found.names, *more], rows)
-
-
-def comparison_html(found: Comparison) -> str:
-    """Charts of angles and their differences, and the table, as HTML."""
-    html = ""
-    if found.angles and all(len(p) for p, _ in found.angles):
-        both = figure(angle_chart(found), "Bending angle against pressure.", "Angle against pressure.")
-        both += figure(
-            difference_chart(found),
-            f"Angle minus that of {escape(found.names[0])}.",
-            f"Difference of each angle to that of {found.names[0]}.",
-        )
-        html = f'<div class="triple">{both}</div>'
-    more = [f"{name} − {found.names[0]}" for name in found.names[1:]]
-    head = [("quantity", ""), *((name, "n") for name in (*found.names, *more))]
-    rows = [
-        ([quantity, *map(number, values), *(number(difference(values[0], v)) for v in values[1:])], False)
-        for quantity, values in found.rows()
-    ]
-    return html + table("Inputs that differ, and all results.", head, rows)
-
-
-def angle_chart(found: Comparison) -> str:
-    """SVG of every study's angle against pressure."""
-    return _lines(found, [angle for _, angle in found.angles], "bending angle [deg]")
-
-
-def difference_chart(found: Comparison) -> str:
-    """SVG of the difference of every study's angle from the first's at the same pressure."""
-    pressure, angle = found.angles[0]
-    return _lines(found, [a - np.interp(p, pressure, angle) for p, a in found.angles], "difference [deg]")
 
 
 def _lines(found: Comparison, values: Sequence[np.ndarray[Any, Any]], words: str) -> str:

@@ -15,7 +15,8 @@ from ..design.steps import STEPS, Path, Stack, Step, Struts, TrimmedStruts
 from ..design.waveguide import Bar
 from ..errors import InputError
 from ..graph.definition import FILE, Call, Definition, Input, Output, Outputs, Setting, setting
-from .late import of_orders
+from ..graph.evaluation import Order
+from ..studies.unit_ranking import UnitStudy
 from .parts import (
     SCALE,
     Design,
@@ -26,6 +27,7 @@ from .parts import (
     known_path,
     part_of,
     rest,
+    solid_of,
     whole_unit,
 )
 
@@ -100,6 +102,11 @@ def _of_step(step: Step) -> Definition:
         part = part_of(step, call)
         return {step.name: part, "value": _value(part)}
 
+    def order(call: Call) -> Order:
+        unit, given, path = solid_of(call)
+        job = UnitStudy(unit=unit, stages=("design",), quality=given.quality, body=given.body, path=path)
+        return Order(job)
+
     solid = step.gives == "solid"
     return Definition(
         kind=step.name,
@@ -111,7 +118,7 @@ def _of_step(step: Step) -> Definition:
         settings=_settings(step),
         muting=step.muting,
         make=None if solid else make,
-        order=of_orders("solid_order") if solid else None,
+        order=order if solid else None,
         read=(lambda call, done: {step.name: done}) if solid else None,
         mute=make if step.muting else None,
         remark=(lambda outputs: _solid_remark(outputs[step.name].summary)) if solid else _remark,

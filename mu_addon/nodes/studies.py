@@ -105,9 +105,36 @@ def _targets(call: Call, one: Any, values: dict[str, Any]) -> Any:
 
 
 def _plan(call: Call, one: Any, values: dict[str, Any]) -> Any:
-    from .sweep_orders import plan_of
+    """The plan of a node Parameter Study. Raises InputError."""
+    from ..studies.parameter_study.plan import planned
+    from ..toml_reader import TomlTable
 
-    return plan_of(call)
+    s, design = call.settings, call.inputs["unit"]
+    refuse_body(design, "a parameter study")
+    ranges = [given for _, given in call.inputs["ranges"]]
+    names = [name for name, _ in ranges]
+    twice = [name for name in names if names.count(name) > 1]
+    if twice:
+        raise InputError(
+            f"{twice[0]} is varied by two ranges",
+            "ranges",
+            "leave one of them out, or vary another parameter",
+        )
+    simulate = {
+        "times": s["times"],
+        "mesh": {"refine": s["refine"]},
+        **({"self_contact": True} if s["self_contact"] else {}),
+        **({"self_friction": s["self_friction"]} if s["self_friction"] else {}),
+    }
+    plain = ("stages", "method", "points", "seed", "memory_MB", "minutes", "protocol")
+    keys = {
+        **{name: s[name] for name in plain},
+        **{name: s[name].split() for name in ("minimize", "maximize")},
+        **({"simulate": simulate} if s["stages"] != motion.STAGES[0] else {}),
+        "vary": dict(ranges),
+    }
+    # It names no file: its folder decides nothing, and is the same everywhere.
+    return planned(TomlTable(keys, call.node), design.unit, Path("/"))
 
 
 def _model(linked: Any) -> Any:

@@ -9,7 +9,8 @@ from ..design.rigid_body import RigidBody
 from ..design.settings import FRICTION
 from ..errors import InputError
 from ..graph.definition import FILE, Call, Definition, Input, Output, Outputs, Setting, setting
-from .late import of_orders
+from ..graph.evaluation import Finished
+from ..studies.parameter_study.results import angles_of
 from .parts import refuse_body
 from .studies import UNIT, node_of
 
@@ -29,6 +30,48 @@ def _obstacle(call: Call) -> Outputs:
     if not s["file"]:
         raise InputError("no body is named", "file", "give a file of a closed surface: STL, OBJ or PLY")
     return {"obstacle": RigidBody(read_body(s["file"]), s["friction"])}
+
+
+def _study_of_place(call: Call, what: str) -> Finished:
+    study: Finished = call.inputs["study"]
+    if what not in study.summary:
+        raise InputError(
+            f"the study has no {what}: its node ranks no paths, or its unit's state depends on history",
+            "study",
+            "link a node Rank Paths",
+        )
+    return study
+
+
+def _sensitivity(call: Call) -> Outputs:
+    """File of a study's sensitivity map, and its largest value in mm."""
+    found = _study_of_place(call, "sensitivity").summary["sensitivity"]
+    return {"field": call.inputs["study"].folder / found["file"], "largest": float(found["largest_mm"])}
+
+
+def _light(call: Call) -> Outputs:
+    """File of a study's signals, and the largest per degree."""
+    found = _study_of_place(call, "light").summary["light"]["sensitivity_per_deg"]
+    best = max(found, key=lambda name: abs(found[name]))
+    return {"signals": call.inputs["study"].folder / "signals.csv", "largest": found[best], "path": best}
+
+
+def _figure(call: Call) -> Outputs:
+    """One number of a study."""
+    summary, what = call.inputs["study"].summary, call.settings["figure"]
+    angles = angles_of(summary)
+    volume = ((summary.get("gates") or {}).get("unit.stl") or {}).get("volume_mm3")
+    by_path = summary.get("J_hat_mm")
+    found = {
+        "angle at the highest pressure": angles[max(angles)] if angles else None,
+        "angle at the lowest pressure": angles[min(angles)] if angles else None,
+        "range of angles": max(angles.values()) - min(angles.values()) if angles else None,
+        "volume of resin": volume,
+        "least deviation": min(by_path.values()) if by_path else None,
+    }[what]
+    if found is None:
+        raise InputError(f"the study has no {what}", "figure", "choose another figure, or link Rank Paths")
+    return {"number": float(found)}
 
 
 FIGURES = (
@@ -66,7 +109,7 @@ def study_nodes() -> tuple[Definition, ...]:
             "the map of how much stiffness anywhere disturbs the motion, and its largest value in mm",
             (_TAKES_STUDY,),
             (Output("field", "field", "sensitivity.vtu"), Output("largest", "number", "largest, in mm")),
-            make=of_orders("sensitivity_of"),
+            make=_sensitivity,
             remark=lambda outputs: f"up to {outputs['largest']:.3g} mm",
         ),
         Definition(
@@ -76,7 +119,7 @@ def study_nodes() -> tuple[Definition, ...]:
             "the signal of a waveguide along every path, and the largest per degree of bending",
             (_TAKES_STUDY,),
             (Output("signals", "file", "signals.csv"), Output("largest", "number", "largest, per degree")),
-            make=of_orders("light_of"),
+            make=_light,
             remark=lambda outputs: f"{outputs['path']}: {outputs['largest']:.3g} per degree",
         ),
         Definition(
@@ -87,7 +130,7 @@ def study_nodes() -> tuple[Definition, ...]:
             (_TAKES_STUDY,),
             (Output("number", "number", "the number"),),
             (setting("figure", FIGURES[0], "which number", choices=FIGURES),),
-            make=of_orders("figure_of"),
+            make=_figure,
             remark=lambda outputs: f"{outputs['number']:.6g}",
         ),
         node_of("homogenize"),

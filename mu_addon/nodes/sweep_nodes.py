@@ -5,14 +5,15 @@ from __future__ import annotations
 from ..errors import InputError
 from ..graph.definition import Call, Definition, Input, Output, Outputs, setting
 from ..meshing.settings import OF_CONTINUUM
-from .late import GOALS, of_orders
-from .parts import described
+from ..studies.sweep import StudyTable, number_in
+from ..toml_reader import TomlTable
+from .parts import Design, described
 from .studies import node_of
 
 STUDY = "Parameter Study"
 FACTOR = "protocol.factor"
 REFINE = "simulate.mesh.refine"
-_ORDERS = "sweep_orders"
+GOALS = ("largest", "smallest")
 
 
 def _varied() -> dict[str, bool]:
@@ -25,7 +26,6 @@ def _varied() -> dict[str, bool]:
 def _range(call: Call) -> Outputs:
     """A range as a line of [vary] in sweep.toml: its name and its table."""
     from ..studies.parameter_study.variable import variable
-    from ..toml_reader import TomlTable
 
     s = call.settings
     name, whole = s["parameter"], _varied()[s["parameter"]]
@@ -54,6 +54,22 @@ def _range_remark(outputs: Outputs) -> str:
     if "values" in table:
         return f"{name}: {', '.join(f'{v:g}' for v in table['values'])}"
     return f"{name}: {table['low']:g} to {table['high']:g}"
+
+
+def best_of(call: Call) -> Outputs:
+    """Unit, figure and number of the point whose figure is largest or smallest; raises InputError."""
+    from ..studies.parameter_study.variable import changed_inputs
+
+    table: StudyTable = call.inputs["table"]
+    figure = call.settings["figure"].strip()
+    rows = [(value, row) for row in table.done if (value := number_in(row, figure)) is not None]
+    if not rows:
+        raise InputError(f"no study has a number {figure!r}", "figure", f"one of: {', '.join(table.columns)}")
+    sign = 1.0 if call.settings["goal"] == GOALS[1] else -1.0
+    value, row = min(rows, key=lambda found: (sign * found[0], int(found[1]["point"])))
+    values = table.plan.values[int(row["point"]) - 1]
+    inputs = changed_inputs(table.plan.inputs, values, table.plan.folder)
+    return {"unit": Design(inputs.unit), "number": value, "point": int(row["point"])}
 
 
 def sweep_nodes() -> tuple[Definition, ...]:
@@ -94,7 +110,7 @@ def sweep_nodes() -> tuple[Definition, ...]:
                 setting("figure", "angle_range_deg", "column of the table"),
                 setting("goal", GOALS[0], "which of them", choices=GOALS),
             ),
-            make=of_orders("best_of", _ORDERS),
+            make=best_of,
             remark=lambda outputs: f"point {outputs['point']}: {outputs['number']:.6g}",
         ),
     )

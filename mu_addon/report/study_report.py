@@ -7,9 +7,9 @@ from html import escape
 from typing import Any
 
 from ..files import write_bytes, write_text
-from ..run.execution import Execution
 from ..run.parts import Beside, Chart, Fact, Part, Pictures, Sentence, Table, flat
 from ..run.progress import spell
+from ..run.shown import Shown
 from ..run.versions import package_versions
 from .html_parts import cards, facts_table, figure, note, number, page, picture_figure, table
 from .plots import seconds as seconds_chart
@@ -19,7 +19,7 @@ from .stopped import NO_PICTURES
 _ALWAYS = {"summary.json": "all results of this run as numbers", "log.ndjson": "log of this run"}
 
 
-def write_page(work: Execution, stopped: str = "") -> None:
+def write_page(work: Shown, stopped: str = "") -> None:
     """Draw the pictures and write report.html; stopped: why an incomplete run stopped."""
     if work.study.joins and not any(parts for _, parts in work.shown):
         return
@@ -30,7 +30,7 @@ def write_page(work: Execution, stopped: str = "") -> None:
         write_text(work.folder / work.study.page, page_of(work, versions, stopped))
 
 
-def page_of(work: Execution, versions: Mapping[str, str], stopped: str = "") -> str:
+def page_of(work: Shown, versions: Mapping[str, str], stopped: str = "") -> str:
     """The whole report as HTML text, of all results that there are."""
     study, seconds = work.study, work.context.seconds
     lead = ""
@@ -74,7 +74,7 @@ def _of_model(summary: Mapping[str, Any]) -> list[str]:
     ]
 
 
-def _html(work: Execution, parts: Sequence[Part]) -> str:
+def _html(work: Shown, parts: Sequence[Part]) -> str:
     """HTML of parts; neighbouring figures become one row of cards."""
     html = ""
     facts: list[tuple[str, str]] = []
@@ -88,7 +88,7 @@ def _html(work: Execution, parts: Sequence[Part]) -> str:
     return html
 
 
-def _one(work: Execution, part: Part) -> str:
+def _one(work: Shown, part: Part) -> str:
     if isinstance(part, Sentence) and part.page and not part.note:
         words = signed(escape(part.text))
         strong = signed(escape(part.strong))
@@ -127,7 +127,7 @@ def _one(work: Execution, part: Part) -> str:
     return ""
 
 
-def _files(work: Execution) -> dict[str, Any]:
+def _files(work: Shown) -> dict[str, Any]:
     """Content of each file that the folder has, inputs first."""
     inputs = dict.fromkeys(work.study.texts(), "inputs of this run")
     known = {**inputs, **work.study.files, **_ALWAYS}

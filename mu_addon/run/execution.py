@@ -16,44 +16,30 @@ from typing import Any
 
 from .. import __version__
 from ..errors import InputError, MuError, OutputError
-from ..files import write_bytes
 from .cache import REVISION, key
 from .cluster import Cluster
 from .context import KEEP_EVERY_S, RunContext
-from .inputs import digest
 from .kept_results import Results, Task
-from .parts import Fact, Fault, File, Part, Sentence, Warn, flat
+from .parts import Part
 from .pool import Pool, WorkerDiedError
 from .progress import Progress
 from .progress_estimate import LOADED, LOADED_S, Plan
+from .shown import Shown
 from .stored import content
 from .study import Dropped, Growth, Members, Section, Study
 
 
-class Execution:
-    """A study at work in a folder; `run` it once.
-
-    lines: sentences for the end of a command; fault: an error that is the result; shown: the sections with
-    their parts, as far as results are there. opening: called before the first file of a study that joins a
-    folder (`Study.joins`).
-    """
+class Execution(Shown):
+    """A study at work in a folder; `run` it once."""
 
     def __init__(self, study: Study, folder: Path, context: RunContext) -> None:
-        self.study, self.folder, self.context = study.complete(), folder, context
+        super().__init__(study.complete(), folder, context)
         self.study.require_possible()
         self.results = Results(self.study, folder, context.progress)
-        self.opening: Callable[[], object] | None = None
-        self.lines: list[str] = []
-        self.fault: MuError | None = None
-        self.shown: list[tuple[Section, list[Part]]] = []
         self._stages = self.results.stages
         self._done: set[Task] = set()
         self._grew: set[Task] = set()
         self._parts: dict[str, tuple[str, list[Part]]] = {}
-        self._recorded: list[list[str]] = []
-        self._warned: set[str] = set()
-        # Digest of what each file holds: one that is shown again is not written again.
-        self._written: dict[str, str] = {}
         self._shown_s = 0.0
         self._growth: dict[str, tuple[Growth, Sequence[Any] | str]] = {}
         of = {name: self._stages[name].over for name in self.results.members}
@@ -275,7 +261,7 @@ class Execution:
             where = f" ({error.where})" if error.where and isinstance(error, InputError) else ""
             words = stage.failing.format(**stage.of_member(task[1]))
             self.results.failed[task] = f"{words}: {error.what}{where}."
-            self._tell(self.results.failed[task])
+            self.tell(self.results.failed[task])
         self._done.add(task)
         if task in self._waiting:
             self._waiting.remove(task)
@@ -346,38 +332,11 @@ class Execution:
                 needed.update(self.results.all_taken(task))
         self.results.forget(needed.__contains__)
 
-    def _tell(self, text: str, where: str = "", remedy: str = "") -> None:
-        """Warn the user, once."""
-        if text not in self._warned:
-            self._warned.add(text)
-            self.context.progress.warning(text, where, remedy)
-
     def show(self) -> None:
         """Write files and summary of all results that there are."""
         shown = [(one, self._section(one)) for one in self.study.sections()]
-        every = [part for _, parts in shown for part in flat(parts)]
-        summary = self.context.summary
-        for path in self._recorded:
-            _drop(summary, path)
-        self._recorded = [part.key.split(".") for part in every if isinstance(part, Fact) and part.key]
-        for part in every:
-            if isinstance(part, Fact) and part.key:
-                _put(summary, part.key.split("."), part.value)
-        warned = [part for part in every if isinstance(part, Warn)]
-        for one in warned:
-            self._tell(one.text, one.where, one.remedy)
-        texts = [text for text in self.results.failed.values() if text]
-        texts = [*dict.fromkeys([*texts, *(one.text for one in warned if one.repeated)])]
-        summary.pop("warnings", None)
-        summary |= {"warnings": texts} if texts else {}
-        self.fault = next((part.error for part in every if isinstance(part, Fault)), None)
-        sentences = [part for part in every if isinstance(part, Sentence)]
-        self.lines = [part.text for part in sentences if part.terminal]
-        for part in sentences:
-            if part.found and part.text not in self._warned:
-                self._warned.add(part.text)
-                self.context.progress.finding(part.text)
-        self.shown, self._shown_s = shown, time.monotonic()
+        self.put(shown, [text for text in self.results.failed.values() if text])
+        self._shown_s = time.monotonic()
 
     def _section(self, one: Section) -> list[Part]:
         """A section's parts, made anew if what it shows is; its files are then written."""
@@ -392,10 +351,7 @@ class Execution:
         if all(there[p] for p, needed in one.parameters.items() if needed and p in there):
             values = {p: self._for_show(p, there.get(p, [])) for p in one.parameters}
             if not any(values[p] is None for p, needed in one.parameters.items() if needed and p in there):
-                parts = list(one.method(self.study, **values))
-        for part in flat(parts):
-            if isinstance(part, File):
-                self._write(part)
+                parts = self.made(one.method(self.study, **values))
         self._parts[name] = state, parts
         return parts
 
@@ -413,23 +369,6 @@ class Execution:
             return next(iter(found.values()), None)
         found.complete = len(found) == len(self.results.members.get(name, []))
         return found or None
-
-    def open(self) -> None:
-        """Begin to use the folder, if it is one that the study joins."""
-        opening, self.opening = self.opening, None
-        if opening is not None:
-            opening()
-
-    def _write(self, file: File) -> None:
-        of = "" if file.of is None else content(file.of)
-        if of and self._written.get(file.name) == of:
-            return
-        made = file.make(self.folder / file.name)
-        self.open()
-        of = of or digest(made or "")
-        if made is not None and self._written.get(file.name) != of:
-            write_bytes(self.folder / file.name, made.encode() if isinstance(made, str) else made)
-        self._written[file.name] = of
 
 
 # The study of a process of the pool, which remembers what it made.
@@ -472,19 +411,3 @@ def _elsewhere(study: Study, task: Task, taken: dict[str, Any], asked: str) -> A
         results = Results(study, Path(folder), Progress())
         own = {n: results.given(n) for n in results.stages[task[0]].needs if n not in results.stages}
         return results.made(task, {**taken, **own})
-
-
-def _drop(table: dict[str, Any], path: Sequence[str]) -> None:
-    """Take a value out of nested tables, and the tables that this leaves empty."""
-    name, *rest = path
-    if rest and isinstance(table.get(name), dict):
-        _drop(table[name], rest)
-    if not rest or table.get(name) == {}:
-        table.pop(name, None)
-
-
-def _put(table: dict[str, Any], path: Sequence[str], value: Any) -> None:
-    *levels, last = path
-    for level in levels:
-        table = table.setdefault(level, {})
-    table[last] = value

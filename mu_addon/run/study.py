@@ -449,8 +449,9 @@ class Study:
     content of each file of the run's folder, by name or pattern; to_fill: files that are filled in by hand,
     which no run removes. example: a command line, "" of a study that is no command. node: None of a study
     that is no node; nodes: in its place by target, of those that are. streams: it has no stages, but does its
-    work by itself (`work`). joins: its folder is one that several studies add to, such as one of measured
-    data: it keeps no inputs and no results there, is not resumed, and begins to use it with its first file.
+    work by itself (`work`), and gives its sections what they show. joins: its folder is one that several
+    studies add to, such as one of measured data: it keeps no inputs and no results there, is not resumed, and
+    begins to use it with its first file.
     page: name of its report, "" without one.
 
     commands: of a study of several, its targets, each with help and example by its name, in order of need.

@@ -17,6 +17,7 @@ from mu_addon.fem.protocol import Protocol
 from mu_addon.materials.library import load_material
 from mu_addon.measured import read_folder
 from mu_addon.measured.kinds import NOISE
+from mu_addon.nodes.graph import Graph
 from mu_addon.nodes.templates import template
 from mu_addon.optimization import read_design
 from mu_addon.run.context import RunContext
@@ -29,7 +30,6 @@ from mu_addon.studies.design_experiments import DesignExperiments
 from mu_addon.studies.diagnose import Diagnose
 from mu_addon.studies.export import Export, TakeOff
 from mu_addon.studies.fit_material import FitMaterial
-from mu_addon.studies.graph import Graph
 from mu_addon.studies.grip import Grip
 from mu_addon.studies.homogenize import Homogenize
 from mu_addon.studies.inputs import NodePath, ResinInput

@@ -13,7 +13,7 @@ from mu_addon.design.parameters import load_preset
 from mu_addon.errors import InputError
 from mu_addon.graph.definition import Call
 from mu_addon.graph.evaluation import Finished
-from mu_addon.nodes import sweep_orders
+from mu_addon.nodes import sweep_nodes
 from mu_addon.nodes.definitions import definitions
 from mu_addon.nodes.parts import Design
 from mu_addon.studies.parameter_study import variable
@@ -122,7 +122,7 @@ def test_the_best_study_gives_its_unit_whatever_failed_beside_it(tmp_path):
     assert found.columns == ("mass_g", "angle_range_deg")
 
     def best(**settings):
-        return sweep_orders.best_of(call("best", {"table": found}, **settings))
+        return sweep_nodes.best_of(call("best", {"table": found}, **settings))
 
     assert best(figure="mass_g")["unit"].unit.chambers.wall_mm == 1.0
     least = best(figure="mass_g", goal="smallest")
