@@ -17,7 +17,7 @@ import attrs
 import numpy as np
 
 from ..errors import InputError
-from ..measured.table import Remark
+from ..measured.table import Remarks
 from ..measured.video import Tracks
 from ..reading import require_rows, text_in
 from ..table_cells.notation import is_like_number
@@ -265,7 +265,7 @@ class _Table:
 
     def __init__(self, layout: _Layout, units: Sequence[str], body: Sequence[Cells], where: str) -> None:
         self.layout, self.body, self.where = layout, body, where
-        self.remarks: list[Remark] = []
+        self.remarks = Remarks()
         self.time, self.per_s = self._time(units)
 
     def of_columns(self) -> Tracks:
@@ -301,12 +301,10 @@ class _Table:
         names = [_name(self._cell(cells, layout.id)) for _, cells in self.body]
         kept = np.array([bool(name) for name in names])
         if not kept.all():
-            self.remarks.append(
-                Remark(
-                    f"{(~kept).sum()} rows without {layout.titles[layout.id]} were left out",
-                    self.where,
-                    "assign them to a track",
-                )
+            self.remarks.add(
+                f"{(~kept).sum()} rows without {layout.titles[layout.id]} were left out",
+                self.where,
+                "assign them to a track",
             )
         ids = {name: m for m, name in enumerate(dict.fromkeys(name for name in names if name))}
         if not ids:
@@ -349,12 +347,10 @@ class _Table:
                     self.where,
                     "export pixels from the upper left corner, x to the right and y downward",
                 )
-            self.remarks.append(
-                Remark(
-                    "x is taken as pixels to the right and y as pixels downward from the upper left corner",
-                    self.where,
-                    "if y grows upward, export it inverted, or the angle has the wrong sign",
-                )
+            self.remarks.add(
+                "x is taken as pixels to the right and y as pixels downward from the upper left corner",
+                self.where,
+                "if y grows upward, export it inverted, or the angle has the wrong sign",
             )
         return Tracks(names, pixels, time_s=time_s, remarks=tuple(self.remarks))
 
@@ -377,12 +373,10 @@ class _Table:
             if known.quantity != "time" or frames or k in (self.layout.frame, self.layout.id):
                 continue
             if known.factor is None:
-                self.remarks.append(
-                    Remark(
-                        f"column {title!r} has no unit and is taken as seconds",
-                        self.where,
-                        "write the unit into its title, as in time_s or time_ms",
-                    )
+                self.remarks.add(
+                    f"column {title!r} has no unit and is taken as seconds",
+                    self.where,
+                    "write the unit into its title, as in time_s or time_ms",
                 )
             return k, known.factor or 1.0
         return None, 1.0
@@ -411,12 +405,10 @@ class _Table:
         if name in self.layout.likelihood:
             lost = self._numbers(self.layout.likelihood[name]) < SURE
             if lost.any():
-                self.remarks.append(
-                    Remark(
-                        f"{lost.sum()} positions of {name} with a likelihood below {SURE:g} count as lost",
-                        self.where,
-                        "correct them in the tracker, or train it further",
-                    )
+                self.remarks.add(
+                    f"{lost.sum()} positions of {name} with a likelihood below {SURE:g} count as lost",
+                    self.where,
+                    "correct them in the tracker, or train it further",
                 )
                 found[lost] = np.nan
         return found
@@ -433,12 +425,10 @@ class _Table:
         """Position of each frame counted from the first one."""
         first = int(frames.min())
         if first not in (0, 1):
-            self.remarks.append(
-                Remark(
-                    f"the table begins at frame {first}; starts_s is the pressure's clock at that frame",
-                    self.where,
-                    "give starts_s of that frame",
-                )
+            self.remarks.add(
+                f"the table begins at frame {first}; starts_s is the pressure's clock at that frame",
+                self.where,
+                "give starts_s of that frame",
             )
         self._require_few(markers, int(frames.max()) - first + 1)
         return np.asarray(frames - first, int)

@@ -21,7 +21,7 @@ from ..toml_reader import TomlTable, read_toml
 from ..toml_writer import toml_text
 from .kinds import COMMON, KINDS
 from .pose import AT_REST, SAMPLES
-from .table import Remark, read_table
+from .table import Remark, Remarks, read_table
 from .video import Motion, Pair, Tracks, View, motion, resting
 from .writing import Entry, csv_text, file_stem
 
@@ -148,7 +148,7 @@ def filmed(tracks: Tracks, bench: Bench, pressure: tuple[Array, Array], where: s
     Frames outside the pressure's record are left out. Raises InputError for a clip without a clock or outside
     the record's time, and a view that does not fit.
     """
-    remarks = list(tracks.remarks)
+    remarks = Remarks(tracks.remarks)
     fps = bench.fps if bench.fps is not None else tracks.fps
     wrong = not (math.isfinite(fps) and fps > 0)
     if wrong and (bench.fps is not None or tracks.time_s is None):
@@ -156,12 +156,10 @@ def filmed(tracks: Tracks, bench: Bench, pressure: tuple[Array, Array], where: s
     if tracks.time_s is not None:
         time = bench.starts_s + tracks.time_s
         if bench.fps is not None:
-            remarks.append(
-                Remark(
-                    f"the markers' own time_s is used; fps = {bench.fps:g} is not used",
-                    where,
-                    "leave fps out, or remove the column time_s where it is wrong",
-                )
+            remarks.add(
+                f"the markers' own time_s is used; fps = {bench.fps:g} is not used",
+                where,
+                "leave fps out, or remove the column time_s where it is wrong",
             )
     else:
         time = bench.starts_s + np.arange(len(tracks)) / fps
@@ -176,13 +174,10 @@ def filmed(tracks: Tracks, bench: Bench, pressure: tuple[Array, Array], where: s
             "give starts_s, the pressure's clock at the first frame",
         )
     if not inside.all():
-        remarks.append(
-            Remark(
-                f"{(~inside).sum()} of {len(inside)} frames are outside the pressure record and were left "
-                "out",
-                where,
-                "start the pressure record before the clip and end it after",
-            )
+        remarks.add(
+            f"{(~inside).sum()} of {len(inside)} frames are outside the pressure record and were left out",
+            where,
+            "start the pressure record before the clip and end it after",
         )
     kept = attrs.evolve(tracks, pixels=tracks.pixels[:, inside], time_s=time[inside] - bench.starts_s)
     time = time[inside]
@@ -193,13 +188,11 @@ def filmed(tracks: Tracks, bench: Bench, pressure: tuple[Array, Array], where: s
     if not rest.any() and seen.all(axis=0).any():
         first = int(np.argmax(seen.all(axis=0)))
         rest[first] = True
-        remarks.append(
-            Remark(
-                f"no frame shows the unit at rest; angles are relative to {p[first]:.4g} kPa at "
-                f"{time[first]:.4g} s",
-                where,
-                "begin the clip at zero pressure; `diagnose` fits the zero of the angle in any case",
-            )
+        remarks.add(
+            f"no frame shows the unit at rest; angles are relative to {p[first]:.4g} kPa at "
+            f"{time[first]:.4g} s",
+            where,
+            "begin the clip at zero pressure; `diagnose` fits the zero of the angle in any case",
         )
     found = motion(kept, bench.view, rest, time, where)
     return Filmed(kept, time, p, found, (*remarks, *found.remarks))

@@ -17,7 +17,7 @@ from ..table_cells.own_tables import own_text
 from ..toml_reader import TomlTable, read_toml
 from .experiment import Array, Experiment
 from .kinds import ACCURACIES, AXES, BETWEEN, CHOICES, KINDS, PRESSURES, ROLES, UP_TO, Kind
-from .table import Remark, read_table
+from .table import Remark, Remarks, read_table
 
 FILE = "experiments.toml"
 # Share of the largest strain by which strain and displacement over length may differ without a remark.
@@ -57,7 +57,7 @@ def read_folder(folder: Path) -> Measured:
     if not entries:
         raise InputError("no experiment is defined", str(path), "begin each with a line [[experiment]]")
     experiments: list[Experiment] = []
-    remarks: list[Remark] = []
+    remarks = Remarks()
     for entry in entries:
         found, notes = _experiment(entry, path.parent)
         _check_apart(found, experiments, entry)
@@ -81,7 +81,7 @@ def _as_run(experiments: Sequence[Experiment], path: Path) -> tuple[Experiment, 
     return tuple(sorted(experiments, key=lambda e: e.run_order or 0.0))
 
 
-def _experiment(entry: TomlTable, folder: Path) -> tuple[Experiment, list[Remark]]:
+def _experiment(entry: TomlTable, folder: Path) -> tuple[Experiment, Remarks]:
     kind = KINDS[entry.word("kind", tuple(KINDS))]
     entry.only(kind.keys, {f"to {k.name}": k.keys for k in KINDS.values()})
     for key in kind.needs_keys:
@@ -91,7 +91,7 @@ def _experiment(entry: TomlTable, folder: Path) -> tuple[Experiment, list[Remark
     remedy = f"{FILE} names it; correct the name or put the file there"
     text = text_in(path, "data", remedy, read=own_text)
     table = read_table(text, kind, path)
-    columns, remarks = dict(table.columns), list(table.remarks)
+    columns, remarks = dict(table.columns), Remarks(table.remarks)
     if "pressure_kPa" in columns:
         columns["pressure_kPa"] = _gauge_pressure(columns["pressure_kPa"], entry)
     if kind.name in ("coupon", "lattice_compression"):
@@ -190,7 +190,7 @@ def _axis(entry: TomlTable) -> tuple[float, float, float]:
 
 
 def _strained(
-    columns: dict[str, Array], fields: dict[str, Any], kind: Kind, path: Path, remarks: list[Remark]
+    columns: dict[str, Array], fields: dict[str, Any], kind: Kind, path: Path, remarks: Remarks
 ) -> dict[str, Array]:
     """The columns with strain and nominal stress added, from displacement and force where needed."""
     needed = {"strain": ("displacement_mm", "length_mm"), "stress_kPa": ("force_N", "section_mm")}
@@ -211,25 +211,21 @@ def _strained(
         columns["strain"] = columns["displacement_mm"] / fields["length_mm"]
         first, span = columns["strain"][0], np.ptp(columns["strain"])
         if abs(first) > DISAGREE * span:
-            remarks.append(
-                Remark(
-                    f"the displacement begins at {columns['displacement_mm'][0]:g} mm, which is read as a "
-                    f"strain of {first:.3g}",
-                    str(path),
-                    "subtract it if it is only the position of the grips",
-                )
+            remarks.add(
+                f"the displacement begins at {columns['displacement_mm'][0]:g} mm, which is read as a "
+                f"strain of {first:.3g}",
+                str(path),
+                "subtract it if it is only the position of the grips",
             )
     elif "displacement_mm" in columns and fields.get("length_mm") is not None:
         moved = columns["displacement_mm"] - columns["displacement_mm"][0]
         strain = columns["strain"] - columns["strain"][0]
         apart = float(np.abs(moved / fields["length_mm"] - strain).max())
         if apart > DISAGREE * float(np.abs(strain).max()):
-            remarks.append(
-                Remark(
-                    f"strain and displacement over length differ by up to {apart:.3g}; the strain is used",
-                    str(path),
-                    "check that length_mm is the length between the marks",
-                )
+            remarks.add(
+                f"strain and displacement over length differ by up to {apart:.3g}; the strain is used",
+                str(path),
+                "check that length_mm is the length between the marks",
             )
     if "stress_kPa" not in columns:
         width, thickness = fields["section_mm"]
@@ -238,7 +234,7 @@ def _strained(
     return columns
 
 
-def _check_strain(strain: Array, rows: Array, kind: Kind, path: Path, remarks: list[Remark]) -> None:
+def _check_strain(strain: Array, rows: Array, kind: Kind, path: Path, remarks: Remarks) -> None:
     """Check for strain that no body can have, or that looks like percent."""
     gone = strain >= 1 if kind.name == "lattice_compression" else strain <= -1
     if gone.any():
@@ -251,26 +247,22 @@ def _check_strain(strain: Array, rows: Array, kind: Kind, path: Path, remarks: l
             + ("compression" if kind.name == "lattice_compression" else "tension"),
         )
     if np.abs(strain).max() > 12:
-        remarks.append(
-            Remark(
-                f"the strain reaches {np.abs(strain).max():g}",
-                f"{path}, row {int(rows[np.argmax(np.abs(strain))])}, column strain",
-                "give strain as a bare number, not in percent; check length_mm, if it is by displacement",
-            )
+        remarks.add(
+            f"the strain reaches {np.abs(strain).max():g}",
+            f"{path}, row {int(rows[np.argmax(np.abs(strain))])}, column strain",
+            "give strain as a bare number, not in percent; check length_mm, if it is by displacement",
         )
 
 
-def _check_preload(columns: dict[str, Array], rows: Array, path: Path, remarks: list[Remark]) -> None:
+def _check_preload(columns: dict[str, Array], rows: Array, path: Path, remarks: Remarks) -> None:
     """Check for stress where there is no strain."""
     strain, stress = np.abs(columns["strain"]), columns["stress_kPa"]
     rest = int(np.argmin(strain))
     if strain[rest] < 1e-3 * strain.max() and abs(stress[rest]) > PRELOAD * np.abs(stress).max():
-        remarks.append(
-            Remark(
-                f"without strain the stress is {stress[rest]:.4g} kPa: a preload, or the load cell's zero",
-                f"{path}, row {int(rows[rest])}, column stress_kPa",
-                "subtract it where it is the zero; a law that is 0 without strain cannot follow it",
-            )
+        remarks.add(
+            f"without strain the stress is {stress[rest]:.4g} kPa: a preload, or the load cell's zero",
+            f"{path}, row {int(rows[rest])}, column stress_kPa",
+            "subtract it where it is the zero; a law that is 0 without strain cannot follow it",
         )
 
 
@@ -311,11 +303,6 @@ def _file(entry: TomlTable, folder: Path) -> Path:
             "keep a folder's files in it, so that it can be moved",
         )
     return folder / path
-
-
-def described(measured: Measured) -> dict[str, list[str]]:
-    """Kind, role and SHA-256 of each experiment's file, by name."""
-    return {e.name: [e.kind, e.role, e.sha256] for e in measured.experiments}
 
 
 def require_same_data(measured: Measured, before: Any, now: Mapping[str, Any]) -> None:

@@ -45,6 +45,14 @@ class Remark:
     remedy: str
 
 
+class Remarks(list[Remark]):
+    """Remarks on data."""
+
+    def add(self, what: str, where: str, remedy: str) -> None:
+        """Add one; see `Remark`."""
+        self.append(Remark(what, where, remedy))
+
+
 @attrs.frozen(eq=False)
 class Table:
     """Columns (n,) by name, in the units of their names; rows (n,): line in the file of each row; remarks."""
@@ -61,7 +69,7 @@ def read_table(text: str, kind: Kind, path: Path) -> Table:
     one before are left out of timed data. path: for messages. Raises InputError for a table that cannot be
     used.
     """
-    remarks: list[Remark] = []
+    remarks = Remarks()
     plain = _plain_numbers(text) if len(text) > LONG else None
     if plain is not None:
         header, rows, values = plain
@@ -156,9 +164,7 @@ def _check_names(header: Sequence[str], row: int, path: Path) -> None:
             raise InputError(f"column {name!r} occurs {header.count(name)} times", _at(path, row), "keep one")
 
 
-def _header(
-    header: Sequence[str], kind: Kind, path: Path, remarks: list[Remark]
-) -> dict[int, tuple[str, float]]:
+def _header(header: Sequence[str], kind: Kind, path: Path, remarks: Remarks) -> dict[int, tuple[str, float]]:
     """Columns that are read and their factors, by position."""
     known = ", ".join(kind.columns) + (", marker1_x_mm, marker1_y_mm, ..." if kind.marked else "")
     kept: dict[int, tuple[str, float]] = {}
@@ -183,9 +189,7 @@ def _header(
         hint = did_you_mean(name, kind.columns, 0.75)
         if hint:
             raise InputError(f"unknown column {name!r}{hint}", _at(path), f"known here: {known}")
-        remarks.append(
-            Remark(f"column {name!r} is not known and was not read", _at(path), f"known here: {known}")
-        )
+        remarks.add(f"column {name!r} is not known and was not read", _at(path), f"known here: {known}")
     names = [name for name, _ in kept.values()]
     for name in names:
         if names.count(name) > 1:
@@ -253,7 +257,7 @@ def _is_number(cell: str) -> bool:
 
 
 def _without_repeats(
-    columns: dict[str, Array], rows: Array, path: Path, remarks: list[Remark]
+    columns: dict[str, Array], rows: Array, path: Path, remarks: Remarks
 ) -> tuple[dict[str, Array], Array]:
     """Rows of a timed record less those that repeat the row before to the last digit."""
     if "time_s" not in columns or len(rows) < 2:
@@ -263,18 +267,16 @@ def _without_repeats(
     if not same.any():
         return columns, rows
     first = rows[1:][same][0]
-    remarks.append(
-        Remark(
-            f"{same.sum()} rows repeat the row before and were left out",
-            _at(path, int(first)),
-            "check the data logger",
-        )
+    remarks.add(
+        f"{same.sum()} rows repeat the row before and were left out",
+        _at(path, int(first)),
+        "check the data logger",
     )
     keep = np.concatenate([[True], ~same])
     return {name: values[keep] for name, values in columns.items()}, rows[keep]
 
 
-def _check_time(time: Array, rows: Array, path: Path, remarks: list[Remark]) -> None:
+def _check_time(time: Array, rows: Array, path: Path, remarks: Remarks) -> None:
     bad = np.flatnonzero(np.isnan(time))
     if len(bad):
         raise InputError(
@@ -294,33 +296,29 @@ def _check_time(time: Array, rows: Array, path: Path, remarks: list[Remark]) -> 
     gaps = np.flatnonzero(step > GAP * usual)
     if len(gaps):
         i = gaps[np.argmax(step[gaps])]
-        remarks.append(
-            Remark(
-                f"{len(gaps)} gap{'s' if len(gaps) > 1 else ''} in time; the longest lasts {step[i]:.4g} s, "
-                f"where {usual:.4g} s is usual",
-                _at(path, int(rows[i + 1])),
-                "rates and lags across the gap are not evaluated",
-            )
+        remarks.add(
+            f"{len(gaps)} gap{'s' if len(gaps) > 1 else ''} in time; the longest lasts {step[i]:.4g} s, "
+            f"where {usual:.4g} s is usual",
+            _at(path, int(rows[i + 1])),
+            "rates and lags across the gap are not evaluated",
         )
 
 
-def _check_missing(name: str, values: Array, rows: Array, path: Path, remarks: list[Remark]) -> None:
+def _check_missing(name: str, values: Array, rows: Array, path: Path, remarks: Remarks) -> None:
     bad = np.flatnonzero(np.isnan(values))
     if not len(bad):
         return
     if not may_be_missing(name) or len(bad) == len(values):
         raise InputError(f"{name} is missing", _at(path, rows[bad[0]], name), "give it, or leave the row out")
-    remarks.append(
-        Remark(
-            f"{len(bad)} of {len(values)} values of {name} are missing",
-            _at(path, int(rows[bad[0]]), name),
-            "these rows are not used for this column",
-        )
+    remarks.add(
+        f"{len(bad)} of {len(values)} values of {name} are missing",
+        _at(path, int(rows[bad[0]]), name),
+        "these rows are not used for this column",
     )
 
 
 def _check_spikes(
-    name: str, values: Array, time: Array | None, rows: Array, path: Path, remarks: list[Remark]
+    name: str, values: Array, time: Array | None, rows: Array, path: Path, remarks: Remarks
 ) -> None:
     """Remark on single values that differ from both neighbours, unlike a corner or a step.
 
@@ -346,12 +344,10 @@ def _check_spikes(
     if found:
         worst = max(found, key=lambda k: abs(d[k]))
         stand = "1 value lies" if len(found) == 1 else f"{len(found)} values lie"
-        remarks.append(
-            Remark(
-                f"{stand} apart from both neighbours, the worst ({x[worst]:.6g}) by {abs(d[worst]):.4g}",
-                _at(path, int(rows[seen[worst]]), name),
-                "check it: an outlier that is not a reading should be removed",
-            )
+        remarks.add(
+            f"{stand} apart from both neighbours, the worst ({x[worst]:.6g}) by {abs(d[worst]):.4g}",
+            _at(path, int(rows[seen[worst]]), name),
+            "check it: an outlier that is not a reading should be removed",
         )
 
 

@@ -14,7 +14,7 @@ import attrs
 import numpy as np
 
 from ..errors import InputError
-from .table import Remark
+from .table import Remark, Remarks
 
 Array = np.ndarray[Any, Any]
 
@@ -102,7 +102,7 @@ def motion(tracks: Tracks, view: View, rest: Array, time_s: Array, where: str = 
     """
     q = {name: _seen(tracks.of(name), view.camera) for name in tracks.names}
     _check(tracks, view, where)
-    remarks: list[Remark] = []
+    remarks = Remarks()
     _remark_lost_markers(q, time_s, remarks, where)
     base = np.stack([q[name] for name in view.base])
     known = np.array([complex(y, z) for y, z in view.places_mm])
@@ -169,7 +169,7 @@ def _check(tracks: Tracks, view: View, where: str) -> None:
             raise InputError(f"{name} = {value:g} is not a length", where, "give a number above 0")
 
 
-def _scale(q: Mapping[str, Array], view: View, known: Array, remarks: list[Remark], where: str) -> float:
+def _scale(q: Mapping[str, Array], view: View, known: Array, remarks: Remarks, where: str) -> float:
     """Millimetres a pixel: as given, by the ruler, or by the base; disagreement is remarked."""
     found = {}
     if view.mm_per_pixel is not None:
@@ -180,13 +180,10 @@ def _scale(q: Mapping[str, Array], view: View, known: Array, remarks: list[Remar
     (first, chosen), *others = found.items()
     for name, value in others:
         if abs(value / chosen - 1) > DISAGREE:
-            remarks.append(
-                Remark(
-                    f"by {first} one pixel is {chosen:.5g} mm, by {name} {value:.5g} mm; the first "
-                    "value is used",
-                    where,
-                    "check that both lie in the plane of the markers and were measured correctly",
-                )
+            remarks.add(
+                f"by {first} one pixel is {chosen:.5g} mm, by {name} {value:.5g} mm; the first value is used",
+                where,
+                "check that both lie in the plane of the markers and were measured correctly",
             )
     return chosen
 
@@ -207,16 +204,14 @@ def _mean_direction(turns: Array) -> complex:
     return mean / abs(mean)
 
 
-def _remark_lost_markers(q: Mapping[str, Array], time_s: Array, remarks: list[Remark], where: str) -> None:
+def _remark_lost_markers(q: Mapping[str, Array], time_s: Array, remarks: Remarks, where: str) -> None:
     for name, at in q.items():
         lost = np.flatnonzero(~np.isfinite(at))
         if len(lost):
-            remarks.append(
-                Remark(
-                    f"marker {name!r} is lost in {len(lost)} of {len(at)} frames, {_spans(lost, time_s)}",
-                    where,
-                    "these rows stay empty; track it again from there if the motion there matters",
-                )
+            remarks.add(
+                f"marker {name!r} is lost in {len(lost)} of {len(at)} frames, {_spans(lost, time_s)}",
+                where,
+                "these rows stay empty; track it again from there if the motion there matters",
             )
 
 
@@ -228,7 +223,7 @@ def _spans(lost: Array, time_s: Array) -> str:
 
 
 def _rigid(
-    q: Mapping[str, Array], pair: Pair, part: str, time_s: Array, remarks: list[Remark], where: str
+    q: Mapping[str, Array], pair: Pair, part: str, time_s: Array, remarks: Remarks, where: str
 ) -> float:
     """Noise of one coordinate, in pixels, from the distance of two markers on a rigid part."""
     apart = np.abs(q[pair[1]] - q[pair[0]])
@@ -236,13 +231,11 @@ def _rigid(
     off = np.abs(apart / usual - 1)
     if np.nanmax(off) > SLIP:
         worst = int(np.nanargmax(off))
-        remarks.append(
-            Remark(
-                f"the {part}'s two markers, {usual:.4g} pixels apart, are {apart[worst]:.4g} apart at "
-                f"{time_s[worst]:.4g} s",
-                where,
-                "one of them slipped, was confused with another feature or left the plane: check that frame",
-            )
+        remarks.add(
+            f"the {part}'s two markers, {usual:.4g} pixels apart, are {apart[worst]:.4g} apart at "
+            f"{time_s[worst]:.4g} s",
+            where,
+            "one of them slipped, was confused with another feature or left the plane: check that frame",
         )
     # From frame to frame: a slow drift of the distance is perspective, not noise.
     steps = np.diff(apart)
@@ -251,17 +244,15 @@ def _rigid(
     return float(1.4826 * np.median(np.abs(steps)) / 2.0) if len(steps) else math.nan
 
 
-def _remark_moved_base(middle: Array, turn: Array, apart: Array, remarks: list[Remark], where: str) -> None:
+def _remark_moved_base(middle: Array, turn: Array, apart: Array, remarks: Remarks, where: str) -> None:
     shift = np.abs(middle - np.nanmedian(middle.real) - 1j * np.nanmedian(middle.imag))
     swing = np.abs(np.angle(turn / _mean_direction(turn))) * apart / 2
     most = max(float(np.nanmax(shift)), float(np.nanmax(swing)))
     if most > MOVED:
-        remarks.append(
-            Remark(
-                f"the base's markers move by up to {most:.3g} pixels, but the base is assumed fixed",
-                where,
-                "the camera or the clamp moved: set follow_base",
-            )
+        remarks.add(
+            f"the base's markers move by up to {most:.3g} pixels, but the base is assumed fixed",
+            where,
+            "the camera or the clamp moved: set follow_base",
         )
 
 
