@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Callable, Mapping
 from typing import Any
 
@@ -42,20 +41,10 @@ class Setting:
 
 
 def setting(
-    name: str,
-    default: Any,
-    text: str,
-    *,
-    unit: str = "",
-    low: float = math.nan,
-    high: float = math.nan,
-    choices: tuple[str, ...] = (),
-    path: str = "",
-    shown: bool = True,
+    name: str, default: Any, text: str, *, path: str = "", shown: bool = True, **more: Any
 ) -> Setting:
-    """A setting that is no parameter of a unit; see `Setting` and `Description`."""
-    found = described(name, default, text, unit=unit, low=low, high=high, choices=choices)
-    return Setting(found, path, shown)
+    """A setting that is no parameter of a unit; see `Setting`; more: unit, bounds, choices of `described`."""
+    return Setting(described(name, default, text, **more), path, shown)
 
 
 @attrs.frozen

@@ -83,7 +83,7 @@ class Comparison:
                 ],
                 across=3,
             )
-        head = [("quantity", ""), *((name, "n") for name in self.titles("−"))]
+        head = ["quantity", *Table.numbers(*self.titles("−"))]
         yield Table("Inputs that differ, and all results.", head, rows)
 
 

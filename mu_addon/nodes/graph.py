@@ -195,7 +195,7 @@ class Graph(Study):
             label = definitions()[n["kind"]].label if n["kind"] in definitions() else n["kind"]
             words = "FAILED" if n["state"] == trees.FAILED else n["state"]
             rows.append([name, label, words, f"{n['seconds']:.3f}", remark, n.get("folder", "")])
-        head = [("node", ""), ("kind", ""), ("state", ""), ("seconds", "n"), ("found", ""), ("folder", "")]
+        head = ["node", "kind", "state", ("seconds", "n"), "found", "folder"]
         yield Table("", head, rows)
 
     def _plain(self, name: str, state: trees.State) -> dict[str, Any]:

@@ -198,26 +198,19 @@ def _failure(context: RunContext, error: Exception) -> MuError:
         what = f"the package {error.name} is not installed"
         return MuError(what, sys.executable, "install the packages that README.md names")
     if isinstance(error, MemoryError) or any(words in str(error) for words in _REFUSED):
-        return _out_of_memory(context)
+        where = f"finished results are in {context.folder}" if context.folder else ""
+        remedy = "use a coarser mesh, fewer workers or a machine with more memory"
+        return MuError("out of memory", where, remedy)
     if isinstance(error, OSError) and error.errno in _DISK:
         # From a library that prints by itself.
         return output_error(error, Path(error.filename or context.folder or "a file"))
-    _log_traceback(context, error)
-    return _unexpected(context, error)
-
-
-def _out_of_memory(context: RunContext) -> MuError:
-    remedy = "use a coarser mesh, fewer workers or a machine with more memory"
-    return MuError("out of memory", _where_results_are(context), remedy)
-
-
-def _unexpected(context: RunContext, error: Exception) -> MuError:
-    remedy = "report it with log.ndjson, which holds the details" if context.folder else "report it"
+    remedy = "report it"
+    if context.folder is not None:
+        remedy = "report it with log.ndjson, which holds the details"
+        with suppress(MuError):
+            trace = "".join(traceback.format_exception(error))
+            log_file(context.folder / "log.ndjson")({"type": "traceback", "text": trace})
     return _Unexpected(f"internal error: {type(error).__name__}: {error}", remedy=remedy)
-
-
-def _where_results_are(context: RunContext) -> str:
-    return f"finished results are in {context.folder}" if context.folder else ""
 
 
 def _stop(context: RunContext, error: MuError) -> None:
@@ -265,14 +258,6 @@ def _write_summary(context: RunContext, state: dict[str, Any]) -> None:
     replace_summary(context.folder / SUMMARY, [context.summary, *stopped])
 
 
-def _log_traceback(context: RunContext, error: Exception) -> None:
-    if context.folder is None:
-        return
-    with suppress(MuError):
-        trace = "".join(traceback.format_exception(error))
-        log_file(context.folder / "log.ndjson")({"type": "traceback", "text": trace})
-
-
 @contextmanager
 def _signals_raise() -> Iterator[list[int]]:
     """Context in which Ctrl-C raises KeyboardInterrupt and SIGTERM _Terminated; yields each Ctrl-C."""
@@ -285,9 +270,12 @@ def _signals_raise() -> Iterator[list[int]]:
         asked.append(number)
         raise KeyboardInterrupt
 
+    def terminated(number: int, frame: FrameType | None) -> None:
+        raise _Terminated("cancelled")
+
     before = {
         signal.SIGINT: signal.signal(signal.SIGINT, interrupted),
-        signal.SIGTERM: signal.signal(signal.SIGTERM, _raise_terminated),
+        signal.SIGTERM: signal.signal(signal.SIGTERM, terminated),
     }
     try:
         yield asked
@@ -306,7 +294,3 @@ def _set_signals(handler: Any) -> None:
 
 def _may_set_signals() -> bool:
     return threading.current_thread() is threading.main_thread()
-
-
-def _raise_terminated(number: int, frame: FrameType | None) -> None:
-    raise _Terminated("cancelled")

@@ -44,7 +44,7 @@ class FolderLock:
         try:
             self.held = _lock(self._handle)
         except BlockingIOError:
-            owner = _owner(self._handle)
+            owner = _owner(_signature(self._handle))
             os.close(self._handle)
             self._handle = -1
             raise InUseError(
@@ -117,14 +117,12 @@ def _signature(handle: int) -> dict[str, Any]:
     return signed if isinstance(signed, dict) else {}
 
 
-def _owner(handle: int) -> str:
-    """Holder of the lock, in words."""
+def _owner(signed: dict[str, Any]) -> str:
+    """Holder of a lock by its signature, in words."""
     try:
-        os.lseek(handle, 0, os.SEEK_SET)
-        signed: Any = json.loads(os.read(handle, 1000))
         number = signed.get("watcher", signed["process"])
         return f"process {number:d} on {signed['machine']!s:.80}, since {signed['since']!s:.80}"
-    except (OSError, ValueError, KeyError, TypeError, RecursionError):
+    except (ValueError, KeyError, TypeError):
         # It has the lock and has not signed yet.
         return "it has just started"
 

@@ -58,20 +58,30 @@ def echo(*lines: str) -> list[Sentence]:
     return [Sentence(line, terminal=True, page=False) for line in lines]
 
 
+def _columns(head: Sequence[Sequence[str]]) -> list[tuple[str, str]]:
+    return [(one, "") if isinstance(one, str) else (one[0], one[1]) for one in head]
+
+
 @attrs.frozen
 class Table:
     """A table of texts.
 
-    head: title of each column, with "n" for numbers, "text" for long texts, "line" for texts of one line;
-    best: rows to mark; groups: titles over so many columns each; stacked: a phone shows each row as a block.
+    head: title of each column, or with it "n" for numbers, "text" for long texts, "line" for texts of one
+    line; best: rows to mark; groups: titles over so many columns each; stacked: a phone shows each row as a
+    block.
     """
 
     caption: str
-    head: Sequence[tuple[str, str]]
+    head: Sequence[tuple[str, str]] = attrs.field(converter=_columns)
     rows: Sequence[Sequence[Any]]
     best: Sequence[int] = ()
     groups: Sequence[tuple[str, int]] = ()
     stacked: bool = False
+
+    @staticmethod
+    def numbers(*titles: str) -> list[tuple[str, str]]:
+        """Columns of numbers."""
+        return [(title, "n") for title in titles]
 
 
 @attrs.frozen

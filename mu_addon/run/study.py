@@ -232,21 +232,37 @@ class Over:
 
 @attrs.frozen
 class Stage:
-    """A stage of a study: see `stage`."""
+    """A stage of a study, one result or one for each member of a set.
+
+    title: of its progress, with a set's names in braces; members of one title are one stage to a user.
+    seconds: expected on two cores, of the study and a title; of a set, for all members of one title.
+    revision: raise it when a change of the code changes the result. over: the set. wanted: False of a study
+    that does without it. kept: in the cache, which needs a result of the type that the method declares, of
+    arrays, numbers, texts and attrs classes of these; else it is made in each run. failing: words for a
+    warning; an error of the stage then does not end the run, and what needs it is left out. parallel:
+    `execution.py` may hand members to processes of their own, the study's `workers`, side by side with all
+    other parallel stages, the first ones first, or to the workers of its `scheduler`. again: True of a study
+    and a result that an earlier run kept and this one makes anew. says: a few words on a result, for its
+    progress. doing: words, of a study and a member, on what is made, for a progress that waits for it.
+    """
 
     name: str
     method: Callable[..., Any]
     title: str
     seconds: Callable[[Any, str], float]
-    revision: int
-    over: Over | None
-    wanted: Callable[[Any], bool]
-    kept: bool
-    failing: str
-    parallel: bool
-    again: Callable[[Any, Any], bool] | None
-    says: Callable[[Any], str] | None
-    doing: Callable[[Any, Any], str] | None
+    revision: int = 1
+    over: Over | None = None
+    wanted: Callable[[Any], bool] = lambda study: True
+    kept: bool = True
+    failing: str = ""
+    parallel: bool = False
+    again: Callable[[Any, Any], bool] | None = None
+    says: Callable[[Any], str] | None = None
+    doing: Callable[[Any, Any], str] | None = None
+
+    def __attrs_post_init__(self) -> None:
+        if self.parallel and not self.kept:
+            raise TypeError(f"stage {self.title!r}: what another process makes must be kept")
 
     @property
     def needs(self) -> tuple[str, ...]:
@@ -282,70 +298,27 @@ class Stage:
 
 
 def stage(
-    title: str,
-    seconds: float | Mapping[str, float] | Callable[[Any], float] = 0.1,
-    *,
-    over: Over | None = None,
-    wanted: Callable[[Any], bool] = lambda study: True,
-    kept: bool = True,
-    failing: str = "",
-    revision: int = 1,
-    parallel: bool = False,
-    again: Callable[[Any, Any], bool] | None = None,
-    says: Callable[[Any], str] | None = None,
-    doing: Callable[[Any, Any], str] | None = None,
+    title: str, seconds: float | Mapping[str, float] | Callable[[Any], float] = 0.1, **more: Any
 ) -> Callable[[Any], Any]:
     """A method that makes one result, or one for each member of a set; its `self` is None.
 
-    title: of its progress, with a set's names in braces; members of one title are one stage to a user.
-    seconds: expected on two cores, of the study or by title; of a set, for all members of one title.
-    wanted: False of a study that does without it. kept: in the cache, which needs a result of the type
-    that the method declares, of arrays, numbers, texts and attrs classes of these; else it is made in
-    each run. failing: words for a warning; an error of the stage then does not end the run, and what
-    needs it is left out. revision: raise it when a change of the code changes the result. parallel:
-    `execution.py` may hand members to processes of their own, the study's `workers`, side by side with all
-    other parallel stages, the first ones first, or to the workers of its `scheduler`. again: True of a study
-    and a result that an earlier run kept and this one makes anew. says: a few words on a result, for its
-    progress. doing: words, of a study and a member, on what is made, for a progress that waits for it.
+    seconds: one number, of the study, or by title; more: of the `Stage`.
     """
-
-    if parallel and not kept:
-        raise TypeError(f"stage {title!r}: what another process makes must be kept")
 
     def mark(method: Any) -> Any:
         def in_time(study: Any, of: str) -> float:
             known = seconds[of] if isinstance(seconds, Mapping) else seconds
             return known(study) if callable(known) else known
 
-        setattr(
-            method,
-            _STAGE,
-            Stage(
-                method.__name__,
-                method,
-                title,
-                in_time,
-                revision,
-                over,
-                wanted,
-                kept,
-                failing,
-                parallel,
-                again,
-                says,
-                doing,
-            ),
-        )
+        setattr(method, _STAGE, Stage(method.__name__, method, title, in_time, **more))
         return method
 
     return mark
 
 
-def intermediate(
-    over: Over | None = None, wanted: Callable[[Any], bool] = lambda study: True
-) -> Callable[[Any], Any]:
+def intermediate(over: Over | None = None, **more: Any) -> Callable[[Any], Any]:
     """A method that makes something in memory, such as a model, whenever a stage takes it; it is not kept."""
-    return stage("", kept=False, over=over, wanted=wanted)
+    return stage("", kept=False, over=over, **more)
 
 
 def derived(method: Any) -> Any:

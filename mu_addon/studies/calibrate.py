@@ -136,10 +136,8 @@ class Calibrate(Study):
     def held(self, checks: tuple[sensing.Check, ...]) -> Iterator[Part]:
         """Accuracy on each held-out sweep."""
         head = [
-            ("sweep", ""),
-            ("error, deg rms", "n"),
-            ("within the 95 % band", "n"),
-            ("within the calibrated range", "n"),
+            "sweep",
+            *Table.numbers("error, deg rms", "within the 95 % band", "within the calibrated range"),
         ]
         rows = [(c.name, f"{c.rms_deg:.2f}", f"{c.within:.0%}", f"{c.possible:.0%}") for c in checks]
         if rows:

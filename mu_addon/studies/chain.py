@@ -512,7 +512,7 @@ class Chain(Study):
         yield from echo(f"target missed by {found.miss_mm:.3g} mm, at {shown} kPa")
         yield Table(
             "",
-            [("unit", ""), ("kPa", "n"), ("at its bound", "")],
+            ["unit", ("kPa", "n"), "at its bound"],
             [(f"unit {n}", f"{p:.2f}", end) for n, p, end in rows],
         )
 
@@ -539,13 +539,12 @@ class Chain(Study):
             "(joints.csv)."
         )
         head = [
-            ("unit", ""),
-            ("turn [deg]", "n"),
-            ("mass [g]", "n"),
-            ("kPa", ""),
+            "unit",
+            *Table.numbers("turn [deg]", "mass [g]"),
+            "kPa",
             ("bending [N mm/rad]", "n"),
         ]
-        head += [("twist [N mm/rad]", "n"), ("axial [N/mm]", "n"), ("error [deg]", "n"), ("error [mm]", "n")]
+        head += Table.numbers("twist [N mm/rad]", "axial [N/mm]", "error [deg]", "error [mm]")
         rows = []
         for n, t in enumerate(tables, 1):
             low, high = t["pressure_kPa"]

@@ -429,7 +429,7 @@ class Check(Study):
         """Every finding, the worst first."""
         words = {"error": "FAILED", "warning": "warning", "pass": "passed", "info": "note"}
         order = ("error", "warning", "info", "pass")
-        head = [("check", ""), ("outcome", ""), ("found", "text"), ("limit", "n"), ("where, mm", "line")]
+        head = ["check", "outcome", ("found", "text"), ("limit", "n"), ("where, mm", "line")]
         rows = []
         for f in sorted(found.findings, key=lambda f: order.index(f.severity)):
             limit = "" if f.limit is None else f"{f.limit:g} {f.unit}".strip() + (" *" if f.assumed else "")
@@ -444,7 +444,7 @@ class Check(Study):
                 text = "; ".join(f"({x:.1f}, {y:.1f}, {z:.1f})" for x, y, z in f.places[:MOST_ROWS])
                 places.append((f.check, text + (" ..." if f.count > MOST_ROWS else "")))
         if places:
-            yield Table("Locations in mm, worst first", [("check", ""), ("places", "text")], places)
+            yield Table("Locations in mm, worst first", ["check", ("places", "text")], places)
 
     @section("layers", "Layers")
     def drawn(self, part: Surface, direction: Sequence[float]) -> Iterator[Part]:
@@ -493,7 +493,6 @@ class Check(Study):
             "in orange.",
             "Supported surface against the largest cup, one point per build direction",
         )
-        numbers = ("cup ml", "in chambers mm²", "islands", "to support mm²", "height mm")
         rows = [
             (
                 design.direction_name(b.direction) + ("" if b.fits else " (does not fit)"),
@@ -506,13 +505,17 @@ class Check(Study):
             )
             for b in [*builds[:MOST_ROWS], *(b for b in builds[MOST_ROWS:] if b.best_among)]
         ]
-        head = [("build direction", ""), *((name, "n") for name in numbers), ("Pareto-optimal", "")]
+        head = [
+            "build direction",
+            *Table.numbers("cup ml", "in chambers mm²", "islands", "to support mm²", "height mm"),
+            "Pareto-optimal",
+        ]
         yield Table("", head, rows, (0,))
 
     @section("limits", "The printer's limits")
     def listed(self, printer: design.Printer) -> Iterator[Part]:
         """The limits and what they rest on."""
-        head = [("limit", "text"), ("value", "n"), ("rests on", ""), ("source", "text")]
+        head = [("limit", "text"), ("value", "n"), "rests on", ("source", "text")]
         rows = [
             (design.MEANING[name], f"{limit.value:g}", limit.standing, limit.source)
             for name, limit in printer.limits.items()

@@ -256,7 +256,7 @@ class DesignExperiments(Study):
             "another experiment."
         )
         head = [
-            ("effect", ""),
+            "effect",
             ("detectable from", "line"),
             ("not absorbed", "n"),
             ("reason if not", "text"),
@@ -268,7 +268,7 @@ class DesignExperiments(Study):
     @section("noise", "Noise of a reading")
     def instruments(self, noise: Mapping[str, float]) -> Iterator[Part]:
         """The noise that was assumed."""
-        head = [("quantity", ""), ("in the unit of its column", "")]
+        head = ["quantity", "in the unit of its column"]
         yield Table("", head, [(evidence.readable(k), v) for k, v in noise.items()])
 
 

@@ -414,8 +414,7 @@ class Export(Study):
             volume = back.get("volume_mm3", back.get("frusta_mm3"))
             rows.append((one.name, one.what, mb, "-" if volume is None else f"{volume:.2f}", error))
         yield Sentence("Each file was read back and compared with what it was written from.")
-        figures = ("MB", "volume read back [mm³]", "error")
-        head = [("file", ""), ("content", "text"), *((name, "n") for name in figures)]
+        head = ["file", ("content", "text"), *Table.numbers("MB", "volume read back [mm³]", "error")]
         yield Table("error: relative, of the volume; of unit-beams.3mf the volume of all beams", head, rows)
         if not made.complete:
             return
@@ -437,7 +436,7 @@ class Export(Study):
         text = f"{resin['ml']:.2f} ml, {resin['g']:.1f} g of {resin['name']}"
         yield from echo(text)
         if steps:
-            head = [("", "n"), ("file", ""), ("how", "text")]
+            head = [("", "n"), "file", ("how", "text")]
             yield Table("Assembly of the STEP files in CAD", head, [(*map(str, s.values()),) for s in steps])
 
     def _manifest(
@@ -482,7 +481,7 @@ class Export(Study):
                 f"The largest cup traps {found.before_ml:.3g} ml without vents and {found.after_ml:.2g} ml "
                 "with them. Glue the plugs in once the unit is washed."
             )
-            head = [("plug", ""), ("vent at, mm", "line"), ("diameter [mm]", "n"), ("length [mm]", "n")]
+            head = ["plug", ("vent at, mm", "line"), *Table.numbers("diameter [mm]", "length [mm]")]
             places = [", ".join(f"{round(x, 2) + 0.0:.2f}" for x in vent.outer) for vent in found.vents]
             sizes = [(f"{vent.diameter:g}", f"{vent.length:.2f}") for vent in found.vents]
             rows = [(f"plug-{n}.stl", p, *s) for n, (p, s) in enumerate(zip(places, sizes, strict=True), 1)]

@@ -259,9 +259,9 @@ class FitMaterial(Study):
         yield csv("errors.csv", ["law", "coupon", "mode", "role", "rms_MPa", "share", "worst"], rows)
         tests = [*fitting.fitted, *fitting.held]
         unseen = [m for m in fitting.modes if any(m in u for u in fitting.unseen.values())]
-        head = [("law", ""), ("parameters", "n")]
+        head = ["law", ("parameters", "n")]
         head += [(c.name + ("" if c in fitting.fitted else ", held out"), "n") for c in tests]
-        head += [*((TITLES[m], "n") for m in unseen), ("score", "n"), ("fails", "")]
+        head += [*Table.numbers(*(TITLES[m] for m in unseen)), ("score", "n"), "fails"]
         by = fitting.choice.by
         rows = []
         for f in fitting.fits:
@@ -304,14 +304,7 @@ class FitMaterial(Study):
             "ones. Where a law does not fit the test, its residual is not noise and the interval is not "
             "valid."
         )
-        head = [
-            ("law", ""),
-            ("parameter", ""),
-            ("value", "n"),
-            ("low 95 %", "n"),
-            ("high 95 %", "n"),
-            ("note", "text"),
-        ]
+        head = ["law", "parameter", *Table.numbers("value", "low 95 %", "high 95 %"), ("note", "text")]
         rows = [
             (
                 f.form.title if i == 0 else "",
@@ -346,12 +339,11 @@ class FitMaterial(Study):
                 title = f.form.title if i == 0 else ""
                 rows.append((title, TITLES[s.mode], stretches, least, f"{s.least_at:.3g}", verdict))
         head = [
-            ("law", ""),
-            ("mode", ""),
+            "law",
+            "mode",
             ("stretches", "line"),
-            ("least stiffness [MPa]", "n"),
-            ("at", "n"),
-            ("verdict", ""),
+            *Table.numbers("least stiffness [MPa]", "at"),
+            "verdict",
         ]
         yield Table("", head, rows, best)
 
@@ -370,7 +362,7 @@ class FitMaterial(Study):
             "bulk modulus": f"not measured by these tests; from Poisson's ratio {materials.POISSON:g}",
             "measured data": data.folder.name,
         }
-        yield Table("", [("what", ""), ("how", "text")], list(rows.items()))
+        yield Table("", ["what", ("how", "text")], list(rows.items()))
 
 
 def _charts(

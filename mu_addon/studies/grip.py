@@ -457,8 +457,8 @@ class Grip(Study):
             "Values of one whole finger. Slip: largest accumulated slip of any contact point. Gap error: "
             "largest penetration of the finger into the cube, which the penalty method admits.",
             [
-                ("cube [mm]", ""), ("phase", ""), ("kPa", "n"), ("angle [deg]", "n"), ("normal [N]", "n"),
-                ("down [N]", "n"), ("sticking [%]", "n"), ("slip [mm]", "n"), ("gap error [mm]", "n"),
+                "cube [mm]", "phase", *Table.numbers("kPa", "angle [deg]", "normal [N]", "down [N]"),
+                *Table.numbers("sticking [%]", "slip [mm]", "gap error [mm]"),
             ],
             rows,
         )  # fmt: skip
@@ -475,8 +475,8 @@ class Grip(Study):
         )
         words = "Dots: friction equals the weight."
         yield Beside([Chart(lambda: charts.pulling(grasps), words, "force against displacement")])
-        head = [("cube [mm]", ""), ("mass [g]", "n"), ("weight [N]", "n"), ("held", ""), ("rise [mm]", "n")]
-        head += [("friction capacity [N]", "n"), ("capacity / weight", "n"), ("2 mu N / weight", "n")]
+        head = ["cube [mm]", *Table.numbers("mass [g]", "weight [N]"), "held", ("rise [mm]", "n")]
+        head += Table.numbers("friction capacity [N]", "capacity / weight", "2 mu N / weight")
         rows = []
         for side, g in grasps.items():
             f = g.lift
@@ -536,7 +536,7 @@ class Grip(Study):
             for d in describe(one)
         ]
         rows += [(f"grip.{name}", f"{value:g}", "", WHY[name]) for name, value in grip.items()]
-        yield Table("", [("parameter", ""), ("value", "n"), ("unit", ""), ("why", "text")], rows)
+        yield Table("", ["parameter", ("value", "n"), "unit", ("why", "text")], rows)
 
 
 def figures_of(found: grasp.Grasp) -> dict[str, Any]:

@@ -417,7 +417,7 @@ class Homogenize(Study):
         yield Pictures(pictures)
         yield Table(
             "Effective elasticity of the periodic lattice, kPa.",
-            [("", ""), *((name, "n") for name in VOIGT)],
+            ["", *Table.numbers(*VOIGT)],
             [
                 (name, *(f"{1e3 * c:.4g}" if c else "0" for c in row))
                 for name, row in zip(VOIGT, e.C, strict=True)
@@ -488,7 +488,7 @@ class Homogenize(Study):
                 Table(
                     "Modulus by evaluation procedure. The paper does not give its procedure; the marked one "
                     "is used here.",
-                    [("procedure", ""), ("plates", ""), ("modulus [kPa]", "n"), ("", "")],
+                    ["procedure", "plates", ("modulus [kPa]", "n"), ""],
                     rows,
                     best,
                 ),
@@ -555,7 +555,7 @@ class Homogenize(Study):
         yield Beside([Chart(chart(i > 0), caption, caption) for i, caption in enumerate(captions)])
         yield Table(
             "At small strain.",
-            [("", ""), ("cell", "n"), ("law", "n")],
+            ["", *Table.numbers("cell", "law")],
             [
                 ("E along an axis [kPa]", f"{1e3 * fit.cell_E_MPa:.4g}", f"{1e3 * fit.E_MPa:.4g}"),
                 ("Poisson's ratio", f"{fit.cell_poisson:.3f}", f"{fit.poisson:.3f}"),
@@ -586,7 +586,7 @@ class Homogenize(Study):
         }
         if octant is not None:
             rows |= {"mesh: nodes": len(octant.nodes), "mesh: tetrahedra": len(octant.tets)}
-        yield Table("", [("input", ""), ("value", "")], list(rows.items()))
+        yield Table("", ["input", "value"], list(rows.items()))
 
 
 def kPa(value: float) -> str:

@@ -169,13 +169,9 @@ class Import(Study):
             if pairs := pairs_of(p.columns, p.keys.get("kind", "")):
                 words = ", ".join(f"{y} against {x}" for x, y in pairs)
                 yield Chart(partial(columns_chart, p.columns, pairs), "", f"{p.name}: {words}")
-            yield Table(
-                "", [("key", ""), ("value", "")], [[key, str(value)] for key, value in p.keys.items()]
-            )
+            yield Table("", ["key", "value"], [[key, str(value)] for key, value in p.keys.items()])
             rows = [[name, p.origin[name], *_extent(v), str(len(v))] for name, v in p.columns.items()]
-            yield Table(
-                "", [("column", ""), ("from", ""), ("least", "n"), ("most", "n"), ("rows", "n")], rows
-            )
+            yield Table("", ["column", "from", *Table.numbers("least", "most", "rows")], rows)
             for words in (*p.concluded, *(f"not read: {one.words}" for one in p.unread)):
                 yield Sentence(words)
 

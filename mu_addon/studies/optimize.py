@@ -351,7 +351,7 @@ class Optimize(Study):
             ],
             across=3,
         )
-        head = [("freedom", ""), ("start", "n"), *((str(place), "n") for place in observed)]
+        head = ["freedom", ("start", "n"), *Table.numbers(*(str(place) for place in observed))]
         rows = [
             [f.name, shown(design.start[n]), *(shown(o.design[n]) for o in observed.values())]
             for n, f in enumerate(design.freedoms)
@@ -369,8 +369,8 @@ class Optimize(Study):
             "standard errors of the three together."
         )
         head = [
-            ("target", ""), ("asked", ""), ("found", "n"), ("on a finer mesh", "n"), ("± mesh", "n"),
-            ("± print", "n"), ("± resin", "n"), ("verdict", ""),
+            "target", "asked", *Table.numbers("found", "on a finer mesh", "± mesh", "± print", "± resin"),
+            "verdict",
         ]  # fmt: skip
         for place, o in _proposed(found, checked).items():
             c, coarse = checked[place], units[o.design, design.settings.refine, True].values
@@ -411,7 +411,7 @@ class Optimize(Study):
             yield Table(
                 "Effect of a tenth of each freedom's range at the first unit, in each target's unit; by "
                 "adjoint gradients.",
-                [("target", ""), *((f.name, "n") for f in continuous)],
+                ["target", *Table.numbers(*(f.name for f in continuous))],
                 [
                     [t.name, *("-" if isnan(v) else f"{v:+.3g}" for v in row)]
                     for t, row in zip(design.judged, slopes, strict=True)
@@ -422,12 +422,12 @@ class Optimize(Study):
     def inputs_shown(self, model: evidence.ExtendedModel | None) -> Iterator[Part]:
         """Targets, freedoms and settings."""
         d = self.design
-        yield Table("", [("target", ""), ("asked", "")], [[t.name, t.words] for t in d.targets])
+        yield Table("", ["target", "asked"], [[t.name, t.words] for t in d.targets])
         ranges = [
             [f.name, ", ".join(map(str, f.values)) if f.discrete else f"{f.low:g} to {f.high:g} {f.unit}"]
             for f in d.freedoms
         ]
-        yield Table("", [("freedom", ""), ("range", "")], ranges)
+        yield Table("", ["freedom", "range"], ranges)
         facts = {
             "body": "the lattice's box" if d.body is None else d.body.name,
             "refinement of the search's mesh": d.settings.refine,
@@ -439,7 +439,7 @@ class Optimize(Study):
             "printer": d.printer,
             "extended model": model is not None,
         }
-        yield Table("", [("setting", ""), ("", "")], list(facts.items()))
+        yield Table("", ["setting", ""], list(facts.items()))
 
 
 def _made(make: Callable[..., Any], *arguments: Any) -> Callable[[Any], Any]:

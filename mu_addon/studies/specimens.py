@@ -162,14 +162,7 @@ class Specimens(Study):
         for key, value in listed.items():
             yield recorded(key, value)
         yield File("manifest.json", lambda path: json_text(listed))
-        head = [
-            ("file", ""),
-            ("copies", "n"),
-            ("size [mm]", "n"),
-            ("mass [g]", "n"),
-            ("experiment", ""),
-            ("measure", ""),
-        ]
+        head = ["file", *Table.numbers("copies", "size [mm]", "mass [g]"), "experiment", "measure"]
         yield Table(
             "",
             head,
@@ -204,7 +197,7 @@ class Specimens(Study):
         names = ("size", "where", "kind", "along")
         yield Table(
             "",
-            [*((name, "") for name in names), ("nominal [mm]", "n"), ("measured [mm]", "n")],
+            [*names, *Table.numbers("nominal [mm]", "measured [mm]")],
             [(f.name, f.where, f.kind, f.axis, f"{f.nominal_mm:g}", "") for f in FEATURES],
         )
 

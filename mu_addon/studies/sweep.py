@@ -290,7 +290,7 @@ class Sweep(Study):
                 drawn.append(Chart(partial(effect_chart, effect, x, y, name, output), "", alt))
             yield Beside(drawn, across=3)
         caption = "First-order share of each result's variance due to one input, corrected for chance."
-        head = [("input", ""), *((output, "n") for output in outputs)]
+        head = ["input", *Table.numbers(*outputs)]
         yield Table(caption, head, [[name, *row] for name, row in shares.items()])
 
     @section("pareto", "Pareto front")
@@ -323,7 +323,7 @@ class Sweep(Study):
         listed = [own[n] for n in best[np.argsort(costs[best, 0], kind="stable")]]
         yield Table(
             f"The {len(best)} of {len(own)} points that are Pareto-optimal.",
-            [("point", ""), *((name, "n") for name in columns)],
+            ["point", *Table.numbers(*columns)],
             [[row["point"], *(_shown(row[name]) for name in columns)] for row in listed],
         )
 
@@ -334,7 +334,7 @@ class Sweep(Study):
         for v in self.plan.variables:
             words = f"{v.low:g} to {v.high:g}" if not v.values else ", ".join(map(str, v.values))
             rows.append([v.name, words + (", evenly in its logarithm" if v.log else "")])
-        yield Table("", [("input", ""), ("values", "")], rows)
+        yield Table("", ["input", "values"], rows)
         p = self.plan
         facts = {
             "method": p.method,
@@ -343,7 +343,7 @@ class Sweep(Study):
             "time limit of a study [min]": p.minutes,
             "resin of the mass": p.resin,
         }
-        yield Table("", [("setting", ""), ("", "")], list(facts.items()))
+        yield Table("", ["setting", ""], list(facts.items()))
 
     @section("points", "Points")
     def listed(self, points: Points) -> Iterator[Part]:
@@ -352,7 +352,7 @@ class Sweep(Study):
         columns = [*self.varied, *self.shown(rows)]
         more = len(rows) - MOST_ROWS
         caption = "points.csv holds all results" + (f", and {more} more points." if more > 0 else ".")
-        head = [("point", ""), ("status", ""), *((name, "n") for name in columns), ("seconds", "n")]
+        head = ["point", "status", *Table.numbers(*columns), ("seconds", "n")]
         shown = []
         for row in rows[:MOST_ROWS]:
             status = "FAILED" if row["status"] == "failed" else row["status"]
@@ -361,7 +361,7 @@ class Sweep(Study):
         failed = [row for row in rows if row["status"] == "failed"][:MOST_ROWS]
         if failed:
             why = ("what", "where", "what_to_do")
-            head = [("failed point", ""), *((name.replace("_", " "), "text") for name in why)]
+            head = ["failed point", *((name.replace("_", " "), "text") for name in why)]
             yield Table("", head, [[row["point"], *(row.get(name, "") for name in why)] for row in failed])
 
 
