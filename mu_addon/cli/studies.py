@@ -9,101 +9,13 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from ..studies import study
-from .options import (
-    add_model,
-    add_obstacles,
-    add_orientation,
-    add_report,
-    add_results,
-    add_setting,
-    add_unit,
-    modelled,
-    presets,
-    require_out,
-    sentence,
-    unit_of,
-)
+from .objects import OBJECTS
+from .options import add_results, add_setting, require_out, sentence
 
 if TYPE_CHECKING:
     from ..run.context import RunContext
     from ..run.study import Input, Study
     from .options import Commands
-
-
-def _add_unit(command: Any, one: Any) -> None:
-    add_unit(command, one.needed and not one.default, results=False)
-    if one.modelled and one.needed and not one.default:
-        add_model(command)
-
-
-def _unit(options: argparse.Namespace, context: RunContext, one: Any, values: dict[str, Any]) -> Any:
-    if one.modelled and one.needed and not one.default:
-        return modelled(options, context, whole=False)[0]
-    from ..design.parameters import load_preset
-
-    if options.preset is None and options.unit is None:
-        return load_preset(one.default) if one.default else None
-    return unit_of(options)
-
-
-def _add_gripper(command: Any, one: Any) -> None:
-    which = command.add_mutually_exclusive_group(required=True)
-    which.add_argument("--preset", metavar="NAME", help=f"Gripper preset: {presets('gripper')}.")
-    which.add_argument("--gripper", metavar="FILE", help="Gripper parameters, a TOML file.")
-
-
-def _gripper(options: argparse.Namespace, context: RunContext, one: Any, values: Any) -> Any:
-    from ..design.gripper import load_gripper, read_gripper
-
-    return load_gripper(options.preset) if options.preset is not None else read_gripper(options.gripper)
-
-
-def _add_plan(command: Any, one: Any) -> None:
-    command.add_argument("file", metavar="FILE", help=one.text)
-
-
-def _plan(options: argparse.Namespace, context: RunContext, one: Any, values: Any) -> Any:
-    from ..studies.parameter_study.plan import read_plan
-
-    return read_plan(Path(options.file)).continued(Path(options.out) / "sweep.toml", options.add)
-
-
-def _add_effects(command: Any, one: Any) -> None:
-    add_model(command)
-    add_orientation(command)
-
-
-def _effects(options: argparse.Namespace, context: RunContext, one: Any, values: dict[str, Any]) -> Any:
-    # The model changes the unit's parameters, too.
-    values["unit"], effects = modelled(options, context)
-    return effects
-
-
-def _add_obstacles(command: Any, one: Any) -> None:
-    add_obstacles(command)
-
-
-def _obstacles(options: argparse.Namespace, context: RunContext, one: Any, values: dict[str, Any]) -> Any:
-    from ..studies.unit_inputs import obstacles_for
-
-    return obstacles_for(values["unit"], options.obstacles, values["body"]) if options.obstacles else ()
-
-
-def _ask(options: argparse.Namespace, context: RunContext, one: Any, values: Any) -> Any:
-    from .asking import asker
-
-    return asker(options)
-
-
-OBJECTS: dict[str, tuple[Callable[..., None], Callable[..., Any]]] = {
-    "unit": (_add_unit, _unit),
-    "gripper": (_add_gripper, _gripper),
-    "effects": (_add_effects, _effects),
-    "obstacles": (_add_obstacles, _obstacles),
-    "plan": (_add_plan, _plan),
-    "ask": (lambda command, one: None, _ask),
-}
-"""By kind of an input that is no plain value: its options are added, its value made of them."""
 
 
 def command_of(name: str) -> tuple[Callable[[Any], None], Callable[[Any, Any], None]]:
@@ -142,7 +54,8 @@ def _add(commands: Commands[Any], kind: type[Study], name: str) -> None:
             OBJECTS[one.kind][0](groups[one.group], one)
     add_results(command)
     if not kind.joins:
-        add_report(command)
+        words = "Compute the numbers only: no pictures, no report.html."
+        command.add_argument("--no-report", dest="report", action="store_false", help=words)
 
 
 def _dest(one: Input) -> str:

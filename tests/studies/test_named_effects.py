@@ -10,7 +10,7 @@ import pytest
 
 from mu_addon.body.printed_mesh import mesh_printed
 from mu_addon.cli.main import main, parser
-from mu_addon.cli.options import modelled
+from mu_addon.cli.objects import modelled
 from mu_addon.design import shapes
 from mu_addon.design.body import body_of
 from mu_addon.design.parameters import load_preset, to_toml
