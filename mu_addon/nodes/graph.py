@@ -18,7 +18,7 @@ from ..run.context import RunContext
 from ..run.parts import Fact, Fault, File, Part, Sentence, Table, Warn, echo, recorded
 from ..run.progress import spell
 from ..run.study import Found, Input, Study, Written, given, section, setting
-from ..studies.inputs import WordsInput
+from ..studies.inputs import WordsInput, asked
 
 
 @attrs.frozen
@@ -59,22 +59,15 @@ class Graph(Study):
     files = {STATES: "state of every node", "compare-*.csv": "comparisons"}
 
     tree: NodeTree = given(TreeInput())
-    wanted: tuple[str, ...] = given(
-        WordsInput(
-            descriptions=(
-                described(
-                    "node",
-                    "",
-                    "evaluate this node and those that it needs; repeat the option for more (default: all "
-                    "nodes)",
-                ),
-            ),
-            many=False,
-            repeated=True,
-            decides=False,
-            metavar="NAME",
-        ),
-        default=(),
+    wanted: tuple[str, ...] = asked(
+        WordsInput,
+        "node",
+        "evaluate this node and those that it needs; repeat the option for more (default: all nodes)",
+        empty=(),
+        many=False,
+        repeated=True,
+        decides=False,
+        metavar="NAME",
     )
     node_reports: bool = setting(
         described("node_reports", False, "also write the full report of every run within the tree"),

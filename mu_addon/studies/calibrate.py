@@ -7,7 +7,7 @@ from pathlib import Path
 
 import attrs
 
-from .. import sensing
+from .. import report, sensing
 from ..run.parts import Chart, Fact, File, Part, Sentence, Table, csv, echo, recorded
 from ..run.study import Node, ReadInput, Study, given, intermediate, section, setting, stage
 from ..sensing.settings import ANGLES, CHANNEL, DARK
@@ -125,12 +125,11 @@ class Calibrate(Study):
         columns = ("angle_deg", "voltage_V", "angle_low_deg", "angle_high_deg")
         yield csv("calibration.csv", columns, np.column_stack([at, volts, near, far]).tolist())
 
-        def chart() -> str:
-            from ..report.calibration_charts import curve_chart
-
-            return curve_chart(found, samples.fitted, samples.held)
-
-        yield Chart(chart, "Readings, calibration curve and its 95 % band", "voltage against angle")
+        yield Chart(
+            lambda: report.curve_chart(found, samples.fitted, samples.held),
+            "Readings, calibration curve and its 95 % band",
+            "voltage against angle",
+        )
 
     @section("held-out", "Held-out sweeps")
     def held(self, checks: tuple[sensing.Check, ...]) -> Iterator[Part]:

@@ -9,7 +9,7 @@ from typing import Any
 
 import attrs
 
-from .. import design
+from .. import design, report
 from ..design.quantity import described
 from ..design.settings import PRINTER, QUALITY, UP
 from ..errors import InputError
@@ -349,12 +349,8 @@ class Check(Study):
             ),
         ]
 
-        def picture() -> list[tuple[str, Any]]:
-            from ..report.print_check_pictures import places_picture
-
-            return [("places.png", places_picture(part.vertices, part.triangles, found, direction))]
-
-        yield Beside([lead, Pictures(picture)])
+        shown = part.vertices, part.triangles, found, direction
+        yield Beside([lead, Pictures(lambda: [("places.png", report.places_picture(*shown))])])
         yield File(PART, lambda path: design.stl_bytes(part.vertices, part.triangles))
         yield File("check.json", lambda path: json_text(self._plain(part, found, printer, direction)))
         yield from self._summary(found, printer)
@@ -454,12 +450,12 @@ class Check(Study):
             return
 
         def chart() -> str:
-            from ..report.print_check_pictures import layer_pictures
-
             heights = self.layers or design.even_heights(part.vertices, direction, LAYERS)
             # A file's chamber may lie elsewhere than its unit's.
             within = design.chamber(self.unit) if self.stl is None and self.unit is not None else None
-            return layer_pictures(design.slices(part.vertices, part.triangles, direction, heights, within))
+            return report.layer_pictures(
+                design.slices(part.vertices, part.triangles, direction, heights, within)
+            )
 
         yield Chart(
             chart,
@@ -482,13 +478,8 @@ class Check(Study):
             "least as good in all of these criteria and better in one."
         )
 
-        def chart() -> str:
-            from ..report.print_check_pictures import trade_off
-
-            return trade_off(builds)
-
         yield Chart(
-            chart,
+            lambda: report.trade_off(builds),
             "Supported surface against the largest cup: one point per build direction, recommended direction "
             "in orange.",
             "Supported surface against the largest cup, one point per build direction",

@@ -9,13 +9,12 @@ from typing import Any
 import attrs
 
 from .. import design, evidence, measured
-from ..design.quantity import described
 from ..errors import InputError
 from ..measured.kinds import NOISE, OF_A_UNIT
 from ..meshing.settings import SELF_CONTACT
 from ..run.parts import Part, Sentence, Table, Warn, csv, echo, listed, recorded
 from ..run.study import Found, Input, Study, Tell, Written, derived, given, section, setting, stage
-from .inputs import MeasuredInput, UnitInput
+from .inputs import MeasuredInput, UnitInput, asked
 
 # Stages as `evidence.simulations_plan` names them.
 LATTICE, FREE, HELD = "lattice", "unit", "unit with its tip held"
@@ -96,17 +95,12 @@ class DesignExperiments(Study):
     example = "design-experiments my-protocols --noise angle=0.5 --out out/plan"
     files = {"limits.csv": "detection limit of every effect, and those that it looks like"}
 
-    data: measured.Measured = given(
-        MeasuredInput(
-            descriptions=(
-                described(
-                    "folder",
-                    "",
-                    "folder of planned experiments, in the format of `diagnose`; the measured columns may "
-                    "hold any numbers",
-                ),
-            )
-        )
+    data: measured.Measured = asked(
+        MeasuredInput,
+        "folder",
+        "folder of planned experiments, in the format of `diagnose`; the measured columns may hold any "
+        "numbers",
+        empty=attrs.NOTHING,
     )
     unit: design.Unit | None = given(
         UnitInput(needed=False),
@@ -114,19 +108,13 @@ class DesignExperiments(Study):
         converter=attrs.Converter(_subject, takes_self=True),
     )
     self_contact: bool = setting(SELF_CONTACT)
-    noise: dict[str, float] = given(
-        NoiseInput(
-            descriptions=(
-                described(
-                    "noise",
-                    "",
-                    "standard deviation of a reading, in the unit of its column; empty: "
-                    + " ".join(f"{quantity}={value:g}" for quantity, value in NOISE.items()),
-                ),
-            ),
-            metavar="QUANTITY=VALUE",
-        ),
-        factory=lambda: dict(NOISE),
+    noise: dict[str, float] = asked(
+        NoiseInput,
+        "noise",
+        "standard deviation of a reading, in the unit of its column; empty: "
+        + " ".join(f"{quantity}={value:g}" for quantity, value in NOISE.items()),
+        empty=attrs.Factory(lambda: dict(NOISE)),
+        metavar="QUANTITY=VALUE",
     )
 
     @property

@@ -9,7 +9,6 @@ from typing import TYPE_CHECKING, Any
 import attrs
 
 from .. import design, evidence, measured
-from ..design.quantity import described
 from ..design.settings import PRESET
 from ..errors import InputError
 from ..meshing.settings import SELF_CONTACT
@@ -148,19 +147,12 @@ class Diagnose(Study):
     data: measured.Measured = given(MeasuredInput())
     unit: design.Unit | None = given(UnitInput(needed=False), default=None)
     self_contact: bool = setting(SELF_CONTACT)
-    known: evidence.ExtendedModel | None = given(
-        ModelInput(
-            file="known.toml",
-            descriptions=(
-                described(
-                    "model",
-                    "",
-                    "extended model of an earlier diagnosis, its model.toml: its effects stay in the model, "
-                    "new causes are added; empty: none",
-                ),
-            ),
-        ),
-        default=None,
+    known: evidence.ExtendedModel | None = asked(
+        ModelInput,
+        "model",
+        "extended model of an earlier diagnosis, its model.toml: its effects stay in the model, new causes "
+        "are added; empty: none",
+        file="known.toml",
     )
     unknown: Any = asked(
         UnknownInput,

@@ -2,14 +2,15 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Iterator
+from functools import partial
 from math import isfinite, nan
 from pathlib import Path
 from typing import Any
 
 import attrs
 
-from .. import materials, measured
+from .. import materials, measured, report
 from ..design.declared_laws import form_names
 from ..errors import InputError
 from ..materials.settings import WEIGHTS
@@ -235,8 +236,9 @@ class FitMaterial(Study):
         for mode in fitting.modes:
             fitted = [c for c in fitting.fitted if c.mode == mode]
             held = [c for c in fitting.held if c.mode == mode]
-            above, below = _charts(mode, fitted, held, fitting.fits, chosen)
-            yield File(f"fit_{mode}.svg", _drawn(above))
+            above = partial(report.mode_chart, mode, fitted, held, fitting.fits, chosen)
+            below = partial(report.residual_chart, mode, [*fitted, *held], fitting.fits, chosen)
+            yield File(f"fit_{mode}.svg", lambda path, draw=above: draw())  # type: ignore[misc]
             missed = [f.form.title for f in fitting.fits if mode in f.fails]
             does = f"{listed(missed)} {'does' if len(missed) == 1 else 'do'} not fit it." if missed else ""
             alt = f"Nominal stress against stretch, {TITLES[mode]}: tests and {len(fitting.fits)} laws."
@@ -365,24 +367,6 @@ class FitMaterial(Study):
         yield Table("", ["what", ("how", "text")], list(rows.items()))
 
 
-def _charts(
-    mode: str, fitted: Sequence[Any], held: Sequence[Any], fits: Sequence[Any], chosen: str
-) -> tuple[Any, Any]:
-    """What draws a mode's tests with the laws, and what draws their differences."""
-
-    def above() -> str:
-        from ..report.coupon_charts import mode_chart
-
-        return mode_chart(mode, fitted, held, fits, chosen)
-
-    def below() -> str:
-        from ..report.coupon_charts import residual_chart
-
-        return residual_chart(mode, [*fitted, *held], fits, chosen)
-
-    return above, below
-
-
 def _best(fitting: Fitting) -> list[int]:
     return [i for i, f in enumerate(fitting.fits) if f is fitting.choice.chosen]
 
@@ -502,8 +486,3 @@ _SUPERSCRIPT = str.maketrans("0123456789", "⁰¹²³⁴⁵⁶⁷⁸⁹")
 
 def _titles(modes: Any) -> list[str]:
     return list(dict.fromkeys(TITLES[mode] for mode in modes))
-
-
-def _drawn(draw: Callable[[], str]) -> Callable[[Path], str]:
-    """What makes a chart's file."""
-    return lambda path: draw()

@@ -29,7 +29,7 @@ from ..run.study import (
     setting,
     stage,
 )
-from .inputs import UNIT, FileInput, NumbersInput
+from .inputs import UNIT, FileInput, NumbersInput, asked
 
 CUBES = described("cubes_mm", "12.5 25", "side lengths in mm of the cubes to grasp")
 COARSE = described("coarse", False, "quick, less accurate run: coarser mesh, longer time steps")
@@ -142,17 +142,13 @@ class Grip(Study):
     density_g_per_ml: float = setting(DENSITY, metavar="G_PER_ML")
     friction: float = setting(FRICTION, metavar="MU")
     beyond_mm: float = setting(BEYOND, metavar="MM")
-    protocol: grasp.Phases = given(
-        PhasesInput(
-            descriptions=(
-                described(
-                    "protocol", "", "pressure protocol with the phases i to v; empty: protocols/gripper.csv"
-                ),
-            ),
-            metavar="CSV",
-            path="file",
-        ),
-        factory=lambda: grasp.shipped_phases(),
+    protocol: grasp.Phases = asked(
+        PhasesInput,
+        "protocol",
+        "pressure protocol with the phases i to v; empty: protocols/gripper.csv",
+        empty=attrs.Factory(lambda: grasp.shipped_phases()),
+        metavar="CSV",
+        path="file",
     )
     coarse: bool = setting(COARSE)
     refine: float = given(

@@ -7,7 +7,7 @@ from typing import Any
 
 import attrs
 
-from .. import design, fem, homogenize, meshing
+from .. import design, fem, homogenize, meshing, report
 from ..design.quantity import described
 from ..errors import InputError
 from ..meshing.settings import REFINE
@@ -26,7 +26,7 @@ from ..run.study import (
     setting,
     stage,
 )
-from .inputs import Resin, ResinInput, UnitInput
+from .inputs import Resin, ResinInput, UnitInput, asked
 
 FRICTIONS: tuple[homogenize.Friction, ...] = ("slide", "stick")
 # Elements to a strut's diameter in the block: its cell's modulus is within 2 % of a fine mesh's.
@@ -76,18 +76,12 @@ class Homogenize(Study):
     }
 
     unit: design.Unit = given(UnitInput())
-    resin: Resin = given(
-        ResinInput(
-            descriptions=(
-                described(
-                    "resin",
-                    "",
-                    "material of the struts: one of the library or a TOML file; empty: that of the unit's "
-                    "membrane",
-                ),
-            ),
-            metavar="NAME|FILE",
-        )
+    resin: Resin = asked(
+        ResinInput,
+        "resin",
+        "material of the struts: one of the library or a TOML file; empty: that of the unit's membrane",
+        empty=attrs.NOTHING,
+        metavar="NAME|FILE",
     )
     cells: int = setting(
         described("cells", 3, "number of cells along each side of the specimen", low=1, high=12), metavar="N"
@@ -408,11 +402,9 @@ class Homogenize(Study):
         yield csv("tensor.csv", ["C_kPa", *VOIGT], rows)
 
         def pictures() -> list[tuple[str, Any]]:
-            from ..report.lattice_charts import cell_picture, modulus_surface
-            from ..report.unit_pictures import skin
-
-            shown = cell_picture(mesh.nodes, skin(mesh.tets), cell.size_mm, e.relative_density)
-            return [("cell.png", shown), ("modulus.png", modulus_surface(e.C))]
+            faces = report.skin(mesh.tets)
+            shown = report.cell_picture(mesh.nodes, faces, cell.size_mm, e.relative_density)
+            return [("cell.png", shown), ("modulus.png", report.modulus_surface(e.C))]
 
         yield Pictures(pictures)
         yield Table(
@@ -472,15 +464,11 @@ class Homogenize(Study):
             "two bounds: frictionless and bonded."
         )
 
-        def chart() -> str:
-            from ..report.lattice_charts import compression_chart, lines_of
-
-            return compression_chart(lines_of({PLATES[f]: t for f, t in tests.items()}, stretched))
-
+        named = {PLATES[f]: t for f, t in tests.items()}
         yield Beside(
             [
                 Chart(
-                    chart,
+                    lambda: report.compression_chart(report.lines_of(named, stretched)),
                     "Nominal stress of the block and of the periodic lattice. Dot: end of the valid range, "
                     "for the reason below; a test would not follow the dotted part.",
                     "Nominal stress against compression.",
@@ -497,12 +485,8 @@ class Homogenize(Study):
         for friction, found in tests.items():
             yield Sentence(f"Between {PLATES[friction]}: {found.why}.")
 
-        def pictures() -> list[tuple[str, Any]]:
-            from ..report.lattice_charts import test_pictures
-
-            return test_pictures(tests.get("stick") or next(iter(tests.values())))
-
-        yield Pictures(pictures)
+        one = tests.get("stick") or next(iter(tests.values()))
+        yield Pictures(lambda: report.test_pictures(one))
 
     @section("law", "Lattice law for the analysis mesh")
     def law(
@@ -540,19 +524,14 @@ class Homogenize(Study):
             "lateral strain."
         )
 
-        def chart(lateral: bool) -> Any:
-            def draw() -> str:
-                from ..report.lattice_charts import stretch_chart
-
-                return stretch_chart(curve, fit, lateral)
-
-            return draw
-
-        captions = (
-            "Stress along an axis.",
-            "Lateral stretch: a foam law cannot follow the kinematics of the struts.",
+        along = "Stress along an axis."
+        aside = "Lateral stretch: a foam law cannot follow the kinematics of the struts."
+        yield Beside(
+            [
+                Chart(lambda: report.stretch_chart(curve, fit, lateral=False), along, along),
+                Chart(lambda: report.stretch_chart(curve, fit, lateral=True), aside, aside),
+            ]
         )
-        yield Beside([Chart(chart(i > 0), caption, caption) for i, caption in enumerate(captions)])
         yield Table(
             "At small strain.",
             ["", *Table.numbers("cell", "law")],

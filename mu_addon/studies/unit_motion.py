@@ -19,7 +19,7 @@ from ..meshing.settings import SELF_CONTACT
 from ..run.parts import File, Part, Sentence, Warn, csv, recorded
 from ..run.study import Input, Members, Over, Study, Tell, given, intermediate, section, setting, stage
 from ..simulate_and_place.settings import SELF_FRICTION, TIMES, UNDER_PRESSURE, WORKERS
-from .inputs import OnceInput, UnitInput
+from .inputs import OnceInput, UnitInput, asked
 from .unit_inputs import BodyInput, EffectsInput, MeshInput, ObstaclesInput, ProtocolInput, grasp
 
 AROUND, SOLVER = "unit and surroundings", "mesh and solver"
@@ -123,23 +123,15 @@ class UnitMotion(Study):
     )
     protocol: fem.Protocol = given(ProtocolInput(), factory=grasp)
     mesh: meshing.MeshSettings = given(MeshInput(), factory=lambda: meshing.MeshSettings())
-    resin: str | None = given(
-        OnceInput(
-            descriptions=(
-                described(
-                    "wall_resin",
-                    "",
-                    "material of the wall: a name of the library or a material file, such as the "
-                    "material.toml of `fit-material`, in place of the unit's [material] and [wall]; empty: "
-                    "those of the unit",
-                ),
-            ),
-            option="resin",
-            metavar="NAME|FILE",
-            group=AROUND,
-            target="simulate",
-        ),
-        default=None,
+    resin: str | None = asked(
+        OnceInput,
+        "wall_resin",
+        "material of the wall: a name of the library or a material file, such as the material.toml of "
+        "`fit-material`, in place of the unit's [material] and [wall]; empty: those of the unit",
+        option="resin",
+        metavar="NAME|FILE",
+        group=AROUND,
+        target="simulate",
     )
     effects: core.NamedEffects = given(EffectsInput(group=AROUND), factory=lambda: core.NamedEffects())
     obstacles: tuple[design.RigidBody, ...] = given(ObstaclesInput(group=AROUND), default=(), converter=tuple)
