@@ -97,13 +97,9 @@ class Compared(Study):
 
     found: Comparison
 
-    def title(self) -> str:
-        """The report's title."""
-        return f"Comparison of {', '.join(self.found.names)}"
-
-    def subtitle(self) -> str:
-        """The number of runs, and their largest angles minus the first's."""
-        return self.found.remark()
+    def heading(self) -> tuple[str, str]:
+        """Title of the report, and below it the number of runs, and how their largest angles differ."""
+        return f"Comparison of {', '.join(self.found.names)}", self.found.remark()
 
     @section("compare", "Side by side")
     def table(self) -> Iterator[Part]:

@@ -137,9 +137,9 @@ class Graph(Study):
             raise shown.fault
         return found
 
-    def title(self) -> str:
-        """The report's title."""
-        return f"Node tree {self.tree.name}"
+    def heading(self) -> tuple[str, str]:
+        """Title of the report."""
+        return f"Node tree {self.tree.name}", ""
 
     @section()
     def answer(self, found: trees.Evaluation) -> Iterator[Part]:

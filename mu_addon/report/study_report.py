@@ -55,7 +55,8 @@ def page_of(work: Shown, versions: Mapping[str, str], stopped: str = "") -> str:
     ]
     notes = [*work.context.summary.get("warnings", []), *(part.text for part in listed)]
     notes += [*_of_model(work.context.summary), *([NO_PICTURES] if work.context.hurried else [])]
-    return page(study.title(), signed(study.subtitle()), note(notes, stopped), lead, sections)
+    title, words = study.heading()
+    return page(title, signed(words), note(notes, stopped), lead, sections)
 
 
 def _time(stages: Mapping[str, float]) -> str:

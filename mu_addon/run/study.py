@@ -468,13 +468,9 @@ class Study:
         """Address of a Dask scheduler for its parallel stages: its input `scheduler`, "" without."""
         return str(getattr(self, "scheduler", None) or "")
 
-    def title(self) -> str:
-        """The report's title."""
+    def heading(self) -> tuple[str, str]:
+        """Title of the report, and the line below it."""
         raise NotImplementedError
-
-    def subtitle(self) -> str:
-        """The line below the title."""
-        return ""
 
     @classmethod
     def node_of(cls, command: str) -> Node | None:

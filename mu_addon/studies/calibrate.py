@@ -71,14 +71,10 @@ class Calibrate(Study):
 
     # What it shows.
 
-    def title(self) -> str:
-        """The report's title."""
-        return "Calibration"
-
-    def subtitle(self) -> str:
-        """The sweeps."""
+    def heading(self) -> tuple[str, str]:
+        """Title of the report, and below it the sweeps."""
         assert self.samples is not None
-        return f"{self.samples.channel}, {len(self.samples.fitted)} sweeps"
+        return "Calibration", f"{self.samples.channel}, {len(self.samples.fitted)} sweeps"
 
     @section()
     def answer(self, found: sensing.Calibration, checks: tuple[sensing.Check, ...]) -> Iterator[Part]:

@@ -376,14 +376,10 @@ class Chain(Study):
 
     # What it shows.
 
-    def title(self) -> str:
-        """The report's title."""
-        return "Units in series"
-
-    def subtitle(self) -> str:
-        """The units."""
+    def heading(self) -> tuple[str, str]:
+        """Title of the report, and below it the units."""
         names = ", ".join(dict.fromkeys(one.unit.name for one in self.units))
-        return f"{len(self.units)} units: {names}"
+        return "Units in series", f"{len(self.units)} units: {names}"
 
     @section()
     def answer(self, shape: chain.Shape, tip_mass_g: float, motion: chain.Motion) -> Iterator[Part]:

@@ -281,13 +281,9 @@ class Check(Study):
 
     # What it shows.
 
-    def title(self) -> str:
-        """The report's title."""
-        return f"Print check: {self.part_name}"
-
-    def subtitle(self) -> str:
-        """The printer."""
-        return self.printer.title
+    def heading(self) -> tuple[str, str]:
+        """Title of the report, and below it the printer."""
+        return f"Print check: {self.part_name}", self.printer.title
 
     @property
     def part_name(self) -> str:

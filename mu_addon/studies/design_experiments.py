@@ -175,14 +175,13 @@ class DesignExperiments(Study):
 
     # What it shows.
 
-    def title(self) -> str:
-        """The report's title."""
-        return f"Experiments planned in {self.data.folder.resolve().name}"
-
-    def subtitle(self) -> str:
-        """Their number."""
+    def heading(self) -> tuple[str, str]:
+        """Title of the report, and below it their number."""
         count = len(self.data.experiments)
-        return f"{count} experiment{'s' if count != 1 else ''}, planned"
+        return (
+            f"Experiments planned in {self.data.folder.resolve().name}",
+            f"{count} experiment{'s' if count != 1 else ''}, planned",
+        )
 
     @section()
     def answer(

@@ -301,15 +301,13 @@ class Diagnose(Study):
 
     # What it shows.
 
-    def title(self) -> str:
-        """The report's title."""
-        return f"Diagnosis of {self.data.folder.resolve().name}"
-
-    def subtitle(self) -> str:
-        """The experiments, and how the unit was modelled."""
+    def heading(self) -> tuple[str, str]:
+        """Title of the report, and below it the experiments, and how the unit was modelled."""
         from ..diagnose.words import subtitle
 
-        return subtitle(self.data.experiments, self.self_contact)
+        return f"Diagnosis of {self.data.folder.resolve().name}", subtitle(
+            self.data.experiments, self.self_contact
+        )
 
     @section()
     def remarks(self, remarked: tuple[measured.Remark, ...]) -> Iterator[Part]:

@@ -360,13 +360,11 @@ class Export(Study):
 
     # What it shows.
 
-    def title(self) -> str:
-        """The report's title."""
-        return f"Export: {self.unit.name}"
-
-    def subtitle(self) -> str:
-        """Scale and path."""
-        return f"scale {self.unit.scale:g}" + (f", waveguide along {self.path.name}" if self.path else "")
+    def heading(self) -> tuple[str, str]:
+        """Title of the report, and below it scale and path."""
+        return f"Export: {self.unit.name}", f"scale {self.unit.scale:g}" + (
+            f", waveguide along {self.path.name}" if self.path else ""
+        )
 
     @section()
     def warned(self, vents: Members) -> Iterator[Part]:

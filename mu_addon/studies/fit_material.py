@@ -135,15 +135,14 @@ class FitMaterial(Study):
 
     # What it shows.
 
-    def title(self) -> str:
-        """The report's title."""
-        return f"A law for {self._material_name()}"
-
-    def subtitle(self) -> str:
-        """Number and modes of the tests."""
+    def heading(self) -> tuple[str, str]:
+        """Title of the report, and below it number and modes of the tests."""
         modes = dict.fromkeys(str(e.mode) for e in self.data.of("coupon"))
         count = len(self.data.of("coupon"))
-        return f"{count} coupon test{'s' if count > 1 else ''}: {', '.join(TITLES[m] for m in modes)}"
+        return (
+            f"A law for {self._material_name()}",
+            f"{count} coupon test{'s' if count > 1 else ''}: {', '.join(TITLES[m] for m in modes)}",
+        )
 
     def _material_name(self) -> str:
         specimens = dict.fromkeys(e.specimen for e in self.data.of("coupon") if e.specimen)

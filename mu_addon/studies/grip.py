@@ -300,16 +300,15 @@ class Grip(Study):
 
     # What it shows.
 
-    def title(self) -> str:
-        """The report's title."""
-        return f"Gripper: {self.gripper.name}"
-
-    def subtitle(self) -> str:
-        """The fingers."""
+    def heading(self) -> tuple[str, str]:
+        """Title of the report, and below it the fingers."""
         from ..report.plots import label
 
         gap = self.gripper.fingers.gap_mm
-        return f"Two {self.gripper.unit.name} {gap:g} mm apart, {label(self.gripper.path)} in each"
+        return (
+            f"Gripper: {self.gripper.name}",
+            f"Two {self.gripper.unit.name} {gap:g} mm apart, {label(self.gripper.path)} in each",
+        )
 
     @section()
     def answer(

@@ -311,14 +311,10 @@ class Homogenize(Study):
 
     # What it shows.
 
-    def title(self) -> str:
-        """The report's title."""
-        return f"From struts to moduli: the lattice of {self.unit.name}"
-
-    def subtitle(self) -> str:
-        """The cell and its resin."""
+    def heading(self) -> tuple[str, str]:
+        """Title of the report, and below it the cell and its resin."""
         cell = self.cell(self.unit)
-        return (
+        return f"From struts to moduli: the lattice of {self.unit.name}", (
             f"Cell of {cell.size_mm:g} mm, {cell.kind.name}, struts of {2 * cell.junction_radius_mm:g} to "
             f"{2 * cell.midspan_radius_mm:g} mm, resin of {kPa(1e3 * self.resin.modulus_MPa)}"
         )

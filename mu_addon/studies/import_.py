@@ -124,13 +124,9 @@ class Import(Study):
                 raise InputError(what, _at(p, entries[-1].text, error), error.remedy) from error
         return Ready(tuple(entries), tuple(remarks))
 
-    def title(self) -> str:
-        """The report's title."""
-        return "Import of measured data"
-
-    def subtitle(self) -> str:
-        """What it shows."""
-        return "How the files were read"
+    def heading(self) -> tuple[str, str]:
+        """Title of the report, and below it what it shows."""
+        return "Import of measured data", "How the files were read"
 
     @section()
     def answer(

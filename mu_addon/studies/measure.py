@@ -115,9 +115,9 @@ class Measure(Study):
         """Remarks of the reader of measured data, before anything is written; raises its InputError."""
         return entry.tried()
 
-    def title(self) -> str:
-        """The report's title."""
-        return f"Measured motion: {self.experiment}"
+    def heading(self) -> tuple[str, str]:
+        """Title of the report."""
+        return f"Measured motion: {self.experiment}", ""
 
     @section()
     def answer(

@@ -225,13 +225,12 @@ class Optimize(Study):
 
     # What it shows.
 
-    def title(self) -> str:
-        """The report's title."""
-        return f"Optimisation of {self.design.unit.name}"
-
-    def subtitle(self) -> str:
-        """Numbers of targets and freedoms."""
-        return f"{len(self.design.targets)} targets, {len(self.design.freedoms)} freedoms"
+    def heading(self) -> tuple[str, str]:
+        """Title of the report, and below it the numbers of targets and freedoms."""
+        return (
+            f"Optimisation of {self.design.unit.name}",
+            f"{len(self.design.targets)} targets, {len(self.design.freedoms)} freedoms",
+        )
 
     @section()
     def answer(self, found: Results, units: Units, checked: Checked | None = None) -> Iterator[Part]:

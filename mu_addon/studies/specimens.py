@@ -118,13 +118,9 @@ class Specimens(Study):
 
     # What it shows.
 
-    def title(self) -> str:
-        """The report's title."""
-        return "Specimens"
-
-    def subtitle(self) -> str:
-        """Of which unit."""
-        return f"of {self.unit.name}, scale {self.unit.scale:g}"
+    def heading(self) -> tuple[str, str]:
+        """Title of the report, and below it the unit."""
+        return "Specimens", f"of {self.unit.name}, scale {self.unit.scale:g}"
 
     @section()
     def answer(self, material: materials.Material) -> Iterator[Part]:

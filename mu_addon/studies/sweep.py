@@ -190,14 +190,13 @@ class Sweep(Study):
 
     # What it shows.
 
-    def title(self) -> str:
-        """The report's title."""
-        return f"Parameter study of {self.plan.inputs.unit.name}"
-
-    def subtitle(self) -> str:
-        """Its size."""
+    def heading(self) -> tuple[str, str]:
+        """Title of the report, and below it its size."""
         method = self.plan.method.replace("_", " ")
-        return f"{len(self.plan.variables)} inputs, {method}, {' + '.join(self.plan.stages)}"
+        return (
+            f"Parameter study of {self.plan.inputs.unit.name}",
+            f"{len(self.plan.variables)} inputs, {method}, {' + '.join(self.plan.stages)}",
+        )
 
     def rows(self, points: Points) -> list[Row]:
         """A row for each point: its number, status, inputs and figures, or why it failed."""

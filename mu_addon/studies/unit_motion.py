@@ -382,14 +382,13 @@ class UnitMotion(Study):
 
     # What it shows.
 
-    def title(self) -> str:
-        """The report's title."""
-        return f"Monolithic Unit {self.unit.name}"
-
-    def subtitle(self) -> str:
-        """The unit."""
+    def heading(self) -> tuple[str, str]:
+        """Title of the report, and below it the unit."""
         d = self.unit.dimensions
-        return f"Monolithic Unit, scale {d.scale:g}, cell {d.cell:g} mm, {d.count} chambers"
+        return (
+            f"Monolithic Unit {self.unit.name}",
+            f"Monolithic Unit, scale {d.scale:g}, cell {d.cell:g} mm, {d.count} chambers",
+        )
 
     @section()
     def asked(self) -> Iterator[Part]:

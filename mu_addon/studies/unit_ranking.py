@@ -754,9 +754,10 @@ class UnitStudy(UnitMotion):
 
     # What it shows.
 
-    def title(self) -> str:
-        """The report's title."""
-        return f"Sensor path for {self.unit.name}" if "place" in self.stages else super().title()
+    def heading(self) -> tuple[str, str]:
+        """Title of the report, and below it the unit."""
+        title, unit = super().heading()
+        return f"Sensor path for {self.unit.name}" if "place" in self.stages else title, unit
 
     @property
     def left_out(self) -> str:

@@ -50,7 +50,7 @@ class Page(HTMLParser):
 def html_of(folder, parts, title="Section", summary=None, **more):
     """The report of parts, first without a section and then in one; title: of all that has one."""
     (folder / "any.csv").touch()
-    study = SimpleNamespace(title=lambda: title, subtitle=lambda: title, texts=dict, files={"any.csv": title})
+    study = SimpleNamespace(heading=lambda: (title, title), texts=dict, files={"any.csv": title})
     shown = [(Section("", "", None), parts), (Section("own", title, None), parts)]
     return report_data.page(study, shown, folder, summary or {}, **more)
 

@@ -69,8 +69,8 @@ class Spring(Study):
     label: str = setting(described("label", "", "a word"))
     workers: int = setting(described("workers", 1, "processes", low=1, high=8), decides=False)
 
-    def title(self):
-        return "A spring"
+    def heading(self):
+        return "A spring", ""
 
     @derived
     def rounded(self, stiffness):
@@ -341,8 +341,8 @@ class Race(Study):
     sprints: bool = setting(described("sprints", False, "the winner runs on"))
     workers: int = setting(described("workers", 1, "processes", low=1, high=8), decides=False)
 
-    def title(self):
-        return "A race"
+    def heading(self):
+        return "A race", ""
 
     @derived
     def pace(self, paces):
@@ -433,8 +433,8 @@ class Guess(Study):
     limit: int = setting(described("limit", 9, "largest number with a square", low=1, high=9))
     workers: int = setting(described("workers", 1, "processes", low=1, high=8), decides=False)
 
-    def title(self):
-        return "Guess"
+    def heading(self):
+        return "Guess", ""
 
     @stage("right", parallel=True)
     def right(self, limit: int) -> tuple[int, ...]:
@@ -485,8 +485,8 @@ class Throws(Study):
     retry: bool = setting(described("retry", False, "throw again where it missed"), decides=False)
     scheduler: str = ""
 
-    def title(self):
-        return "Throws"
+    def heading(self):
+        return "Throws", ""
 
     @stage(
         "throws",
@@ -659,8 +659,8 @@ class Weighing(Study):
         ReadInput(of=lambda study: Weights(study.notes.read_text()), what="weights"), default=None
     )
 
-    def title(self):
-        return "Weighing"
+    def heading(self):
+        return "Weighing", ""
 
     @stage("pan", wanted=lambda study: study.tare > 0.0, failing="The pan is left out")
     def pan(self, tare: float) -> float:
