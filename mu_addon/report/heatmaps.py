@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -11,6 +11,7 @@ from .results import Floats
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
+    from matplotlib.cm import ScalarMappable
     from matplotlib.colors import Normalize
     from matplotlib.image import AxesImage
 
@@ -61,13 +62,16 @@ def color_bar(top: float) -> str:
     """SVG of the colour scale from 0 to `top` mm that the heatmaps share."""
     from matplotlib.cm import ScalarMappable
 
+    series = np.outer(10.0 ** np.arange(-6, 6), [1.0, 2.0, 5.0]).ravel()
+    ticks = [0.0, *series[(series > 0.01 * top) & (series <= top)]]
+    return _bar(ScalarMappable(_deviation_norm(top), MAP), "deviation Δ [mm]", ticks=ticks, format="%g")
+
+
+def _bar(colors: ScalarMappable, name: str, **more: Any) -> str:
     with canvas(WIDTH, 0.62) as (figure, svg):
         axes = figure.add_axes((0.04, 0.68, 0.92, 0.26))
-        mappable = ScalarMappable(_deviation_norm(top), MAP)
-        series = np.outer(10.0 ** np.arange(-6, 6), [1.0, 2.0, 5.0]).ravel()
-        ticks = [0.0, *series[(series > 0.01 * top) & (series <= top)]]
-        bar = figure.colorbar(mappable, cax=axes, orientation="horizontal", ticks=ticks, format="%g")
-        bar.set_label("deviation Δ [mm]", fontsize=8, labelpad=2)
+        bar = figure.colorbar(colors, cax=axes, orientation="horizontal", **more)
+        bar.set_label(name, fontsize=8, labelpad=2)
         bar.outline.set_linewidth(0.6)
     return svg()
 
@@ -84,10 +88,4 @@ def field_bar(low: float, top: float, name: str) -> str:
     from matplotlib.cm import ScalarMappable
     from matplotlib.colors import Normalize
 
-    with canvas(WIDTH, 0.62) as (figure, svg):
-        axes = figure.add_axes((0.04, 0.68, 0.92, 0.26))
-        mappable = ScalarMappable(Normalize(low, top), FIELD_MAP)
-        bar = figure.colorbar(mappable, cax=axes, orientation="horizontal", format="%.3g", extend="max")
-        bar.set_label(name, fontsize=8, labelpad=2)
-        bar.outline.set_linewidth(0.6)
-    return svg()
+    return _bar(ScalarMappable(Normalize(low, top), FIELD_MAP), name, format="%.3g", extend="max")
