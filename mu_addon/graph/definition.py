@@ -142,4 +142,27 @@ class Definition:
         return next((o for o in self.outputs if o.name == name), None)
 
 
+def node(
+    category: str,
+    inputs: tuple[Input, ...] = (),
+    outputs: tuple[Output, ...] = (),
+    settings: tuple[Setting, ...] = (),
+    *,
+    label: str = "",
+    **more: Any,
+) -> Callable[[Callable[[Call], Outputs]], Definition]:
+    """The kind of node whose outputs a function makes: it has the function's name, and its docstring as text.
+
+    label: if not that name; more: of the `Definition`.
+    """
+
+    def of(make: Callable[[Call], Outputs]) -> Definition:
+        kind, text = make.__name__.rstrip("_"), str(make.__doc__)
+        named = label or kind.replace("_", " ").title()
+        text = text[0].lower() + text[1:].rstrip(".")
+        return Definition(kind, named, category, text, inputs, outputs, settings, make=make, **more)
+
+    return of
+
+
 Definitions = Mapping[str, Definition]

@@ -5,13 +5,20 @@ from __future__ import annotations
 from pathlib import Path
 
 from ..errors import InputError
-from ..graph.definition import FILE, FOLDER, Call, Definition, Output, Outputs, setting
+from ..graph.definition import FILE, FOLDER, Call, Definition, Output, Outputs, node, setting
 from .studies import node_of
 
 BENCH = "Bench"
 
 
-def _recording(call: Call) -> Outputs:
+@node(
+    BENCH,
+    outputs=(Output("recording", "recording", "its samples"),),
+    settings=(setting("folder", "", "folder of a recording", path=FOLDER),),
+    remark=lambda outputs: outputs["words"],
+)
+def recording(call: Call) -> Outputs:
+    """A recording that was made before."""
     from ..sensing.recording import read_recording
 
     folder = call.settings["folder"]
@@ -25,7 +32,14 @@ def _recording(call: Call) -> Outputs:
     return {"recording": Path(folder), "words": words}
 
 
-def _calibration(call: Call) -> Outputs:
+@node(
+    BENCH,
+    outputs=(Output("calibration", "calibration", "the map"),),
+    settings=(setting("file", "", "calibration.toml", path=FILE),),
+    remark=lambda outputs: "{:.3g} to {:.3g} deg".format(*outputs["range"]),
+)
+def calibration(call: Call) -> Outputs:
+    """A calibration that was made before."""
     from ..sensing.calibration import read_calibration
 
     file = call.settings["file"]
@@ -37,28 +51,4 @@ def _calibration(call: Call) -> Outputs:
 
 def bench_nodes() -> tuple[Definition, ...]:
     """Definitions of the nodes of the bench."""
-    return (
-        node_of("record"),
-        Definition(
-            "recording",
-            "Recording",
-            BENCH,
-            "a recording that was made before",
-            outputs=(Output("recording", "recording", "its samples"),),
-            settings=(setting("folder", "", "folder of a recording", path=FOLDER),),
-            make=_recording,
-            remark=lambda outputs: outputs["words"],
-        ),
-        node_of("calibrate"),
-        Definition(
-            "calibration",
-            "Calibration",
-            BENCH,
-            "a calibration that was made before",
-            outputs=(Output("calibration", "calibration", "the map"),),
-            settings=(setting("file", "", "calibration.toml", path=FILE),),
-            make=_calibration,
-            remark=lambda outputs: "{:.3g} to {:.3g} deg".format(*outputs["range"]),
-        ),
-        node_of("measure"),
-    )
+    return node_of("record"), recording, node_of("calibrate"), calibration, node_of("measure")

@@ -14,7 +14,7 @@ from ..design.settings import PRESET, QUALITY
 from ..design.steps import STEPS, Path, Stack, Step, Struts, TrimmedStruts
 from ..design.waveguide import Bar
 from ..errors import InputError
-from ..graph.definition import FILE, Call, Definition, Input, Output, Outputs, Setting, setting
+from ..graph.definition import FILE, Call, Definition, Input, Output, Outputs, Setting, node, setting
 from ..graph.evaluation import Order
 from ..studies.unit_ranking import UnitStudy
 from .parts import (
@@ -159,7 +159,37 @@ def _solid_remark(summary: Mapping[str, Any]) -> str:
 # The unit: by its steps, from a file, and one of which a parameter is changed.
 
 
-def _assembled(call: Call) -> Outputs:
+def unit_remark(outputs: Outputs) -> str:
+    """Wall and height of a unit, in mm."""
+    d = outputs["unit"].unit.dimensions
+    return f"wall {d.wall:.3g} mm, {d.height:.4g} mm long"
+
+
+def _renamed(path: str) -> Setting:
+    """A parameter named with its section, since sections have parameters of the same name."""
+    return Setting(described()[path]._replace(name=path.replace(".", "_")))
+
+
+@node(
+    DESIGN,
+    tuple(
+        Input(
+            name,
+            (STEPS[name].gives,),
+            f"link a node {name.capitalize()}",
+            (name,),
+            needed=not _may_lack(STEPS["solid"], name),
+        )
+        for name in STEPS["solid"].after
+    ),
+    (Output("unit", "unit", "the unit"),),
+    (setting("name", "custom", "name of the unit"), *map(_renamed, rest())),
+    label="Assemble Unit",
+    remark=unit_remark,
+    named=True,
+)
+def assemble(call: Call) -> Outputs:
+    """The unit of these parts, with its material, wall law and printer."""
     # As a step that is made from all parts of the solid.
     part = part_of(attrs.evolve(STEPS["solid"], own=(), chosen=()), attrs.evolve(call, muted=False))
     more = {path: call.settings[path.replace(".", "_")] for path in rest()}
@@ -184,17 +214,47 @@ def _chosen_origin(part: Part, origin: Mapping[str, str]) -> dict[str, str]:
     return found
 
 
-def _read_unit(call: Call) -> Outputs:
+@node(
+    UNIT,
+    outputs=(Output("unit", "unit", "the unit"),),
+    settings=(
+        setting("preset", PRESET, "shipped unit", choices=tuple(preset_names())),
+        setting("file", "", "TOML file of a unit, in place of the preset", path=FILE),
+        _PATH,
+        setting("parameters", "", "TOML text of a unit, in place of preset and file", shown=False),
+    ),
+    remark=unit_remark,
+    named=True,
+)
+def unit(call: Call) -> Outputs:
+    """A unit by its preset or its file of parameters."""
     s = call.settings
     if s["parameters"]:
-        unit = from_toml(s["parameters"], "parameters")
+        found = from_toml(s["parameters"], "parameters")
     else:
-        unit = read_unit(s["file"]) if s["file"] else load_preset(s["preset"])
+        found = read_unit(s["file"]) if s["file"] else load_preset(s["preset"])
     origin = dict.fromkeys(described(), call.node)
-    return {"unit": Design(unit, known_path(unit, s["path"]), origin=origin)}
+    return {"unit": Design(found, known_path(found, s["path"]), origin=origin)}
 
 
-def _with_parameter(call: Call) -> Outputs:
+NUMBERS = tuple(path for path, d in described().items() if d.type in (int, float))
+
+
+@node(
+    UNIT,
+    (Input("unit", ("unit",), "link a unit"),),
+    (Output("unit", "unit", "the changed unit"),),
+    (
+        setting("parameter", "chambers.wall_mm", "which parameter, by section and name", choices=NUMBERS),
+        setting("value", 0.9, "its value, in the parameter's unit", low=-1e6, high=1e6),
+    ),
+    muting="the unit passes unchanged",
+    mute=lambda call: {"unit": call.inputs["unit"]},
+    remark=unit_remark,
+    named=True,
+)
+def set_parameter(call: Call) -> Outputs:
+    """The unit with another value of one parameter."""
     design: Design = call.inputs["unit"]
     path, value = call.settings["parameter"], call.settings["value"]
     d = described()[path]
@@ -208,77 +268,6 @@ def _with_parameter(call: Call) -> Outputs:
     return {"unit": attrs.evolve(design, unit=unit, origin={**design.origin, path: call.node})}
 
 
-def unit_remark(outputs: Outputs) -> str:
-    """Wall and height of a unit, in mm."""
-    d = outputs["unit"].unit.dimensions
-    return f"wall {d.wall:.3g} mm, {d.height:.4g} mm long"
-
-
-def _renamed(path: str) -> Setting:
-    """A parameter named with its section, since sections have parameters of the same name."""
-    return Setting(described()[path]._replace(name=path.replace(".", "_")))
-
-
 def design_nodes() -> tuple[Definition, ...]:
     """Definitions of the nodes of the design."""
-    numbers = tuple(path for path, d in described().items() if d.type in (int, float))
-    assembled = tuple(
-        Input(
-            name,
-            (STEPS[name].gives,),
-            f"link a node {name.capitalize()}",
-            (name,),
-            needed=not _may_lack(STEPS["solid"], name),
-        )
-        for name in STEPS["solid"].after
-    )
-    return (
-        *(_of_step(step) for step in STEPS.values()),
-        Definition(
-            "assemble",
-            "Assemble Unit",
-            DESIGN,
-            "the unit of these parts, with its material, wall law and printer",
-            assembled,
-            (Output("unit", "unit", "the unit"),),
-            (setting("name", "custom", "name of the unit"), *map(_renamed, rest())),
-            make=_assembled,
-            remark=unit_remark,
-            named=True,
-        ),
-        Definition(
-            "unit",
-            "Unit",
-            UNIT,
-            "a unit by its preset or its file of parameters",
-            outputs=(Output("unit", "unit", "the unit"),),
-            settings=(
-                setting("preset", PRESET, "shipped unit", choices=tuple(preset_names())),
-                setting("file", "", "TOML file of a unit, in place of the preset", path=FILE),
-                _PATH,
-                setting("parameters", "", "TOML text of a unit, in place of preset and file", shown=False),
-            ),
-            make=_read_unit,
-            remark=unit_remark,
-            named=True,
-        ),
-        Definition(
-            "set_parameter",
-            "Set Parameter",
-            UNIT,
-            "the unit with another value of one parameter",
-            (Input("unit", ("unit",), "link a unit"),),
-            (Output("unit", "unit", "the changed unit"),),
-            (
-                setting(
-                    "parameter", "chambers.wall_mm", "which parameter, by section and name", choices=numbers
-                ),
-                setting("value", 0.9, "its value, in the parameter's unit", low=-1e6, high=1e6),
-            ),
-            make=_with_parameter,
-            muting="the unit passes unchanged",
-            mute=lambda call: {"unit": call.inputs["unit"]},
-            remark=unit_remark,
-            named=True,
-        ),
-    )
+    return *(_of_step(step) for step in STEPS.values()), assemble, unit, set_parameter

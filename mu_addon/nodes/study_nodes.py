@@ -8,24 +8,31 @@ from ..design.quantity import describe
 from ..design.rigid_body import RigidBody
 from ..design.settings import FRICTION
 from ..errors import InputError
-from ..graph.definition import FILE, Call, Definition, Input, Output, Outputs, Setting, setting
+from ..graph.definition import FILE, Call, Definition, Input, Output, Outputs, Setting, node, setting
 from ..graph.evaluation import Finished
 from ..studies.parameter_study.results import angles_of
 from .parts import refuse_body
 from .studies import UNIT, node_of
 
-SIMULATE, PLACE, PRINT, GRASP = "Simulate", "Sensor", "Print", "Gripper"
+SIMULATE, PLACE, GRASP = "Simulate", "Sensor", "Gripper"
+FIGURES = (
+    "angle at the highest pressure",
+    "angle at the lowest pressure",
+    "range of angles",
+    "volume of resin",
+    "least deviation",
+)
+_TAKES_STUDY = Input("study", ("study",), "link a node Simulate or Rank Paths")
 
 
-def _gripper(call: Call) -> Outputs:
-    s, design = call.settings, call.inputs["unit"]
-    refuse_body(design, "a gripper")
-    fingers = Fingers(**{d.name: s[d.name] for d in describe(Fingers)})
-    plate = Plate(**{d.name: s[d.name] for d in describe(Plate)})
-    return {"gripper": Gripper(design.unit, path=design.path or s["path"], fingers=fingers, plate=plate)}
-
-
-def _obstacle(call: Call) -> Outputs:
+@node(
+    SIMULATE,
+    outputs=(Output("obstacle", "obstacle", "the body"),),
+    settings=(setting("file", "", "closed surface in mm: STL, OBJ or PLY", path=FILE), Setting(FRICTION)),
+    remark=lambda outputs: outputs["obstacle"].name,
+)
+def obstacle(call: Call) -> Outputs:
+    """A rigid body that the unit may touch, fixed in the unit's frame."""
     s = call.settings
     if not s["file"]:
         raise InputError("no body is named", "file", "give a file of a closed surface: STL, OBJ or PLY")
@@ -43,20 +50,40 @@ def _study_of_place(call: Call, what: str) -> Finished:
     return study
 
 
-def _sensitivity(call: Call) -> Outputs:
-    """File of a study's sensitivity map, and its largest value in mm."""
+@node(
+    PLACE,
+    (_TAKES_STUDY,),
+    (Output("field", "field", "sensitivity.vtu"), Output("largest", "number", "largest, in mm")),
+    remark=lambda outputs: f"up to {outputs['largest']:.3g} mm",
+)
+def sensitivity(call: Call) -> Outputs:
+    """The map of how much stiffness anywhere disturbs the motion, and its largest value in mm."""
     found = _study_of_place(call, "sensitivity").summary["sensitivity"]
     return {"field": call.inputs["study"].folder / found["file"], "largest": float(found["largest_mm"])}
 
 
-def _light(call: Call) -> Outputs:
-    """File of a study's signals, and the largest per degree."""
+@node(
+    PLACE,
+    (_TAKES_STUDY,),
+    (Output("signals", "file", "signals.csv"), Output("largest", "number", "largest, per degree")),
+    remark=lambda outputs: f"{outputs['path']}: {outputs['largest']:.3g} per degree",
+)
+def light(call: Call) -> Outputs:
+    """The signal of a waveguide along every path, and the largest per degree of bending."""
     found = _study_of_place(call, "light").summary["light"]["sensitivity_per_deg"]
     best = max(found, key=lambda name: abs(found[name]))
     return {"signals": call.inputs["study"].folder / "signals.csv", "largest": found[best], "path": best}
 
 
-def _figure(call: Call) -> Outputs:
+@node(
+    SIMULATE,
+    (_TAKES_STUDY,),
+    (Output("number", "number", "the number"),),
+    (setting("figure", FIGURES[0], "which number", choices=FIGURES),),
+    label="Figure of a Study",
+    remark=lambda outputs: f"{outputs['number']:.6g}",
+)
+def figure(call: Call) -> Outputs:
     """One number of a study."""
     summary, what = call.inputs["study"].summary, call.settings["figure"]
     angles = angles_of(summary)
@@ -74,81 +101,26 @@ def _figure(call: Call) -> Outputs:
     return {"number": float(found)}
 
 
-FIGURES = (
-    "angle at the highest pressure",
-    "angle at the lowest pressure",
-    "range of angles",
-    "volume of resin",
-    "least deviation",
+@node(
+    GRASP,
+    (UNIT,),
+    (Output("gripper", "gripper", "the gripper"),),
+    (
+        setting("path", "alpha4", "path of the waveguides if the unit has none"),
+        *map(Setting, (*describe(Fingers), *describe(Plate))),
+    ),
+    remark=lambda outputs: "{:.4g} x {:.4g} mm".format(*outputs["gripper"].size_mm),
 )
-_TAKES_STUDY = Input("study", ("study",), "link a node Simulate or Rank Paths")
+def gripper(call: Call) -> Outputs:
+    """Two equal units on a plate."""
+    s, design = call.settings, call.inputs["unit"]
+    refuse_body(design, "a gripper")
+    fingers = Fingers(**{d.name: s[d.name] for d in describe(Fingers)})
+    plate = Plate(**{d.name: s[d.name] for d in describe(Plate)})
+    return {"gripper": Gripper(design.unit, path=design.path or s["path"], fingers=fingers, plate=plate)}
 
 
 def study_nodes() -> tuple[Definition, ...]:
     """Definitions of the nodes of simulation, sensor, print and gripper."""
-    return (
-        node_of("simulate"),
-        Definition(
-            "obstacle",
-            "Obstacle",
-            SIMULATE,
-            "a rigid body that the unit may touch, fixed in the unit's frame",
-            outputs=(Output("obstacle", "obstacle", "the body"),),
-            settings=(
-                setting("file", "", "closed surface in mm: STL, OBJ or PLY", path=FILE),
-                Setting(FRICTION),
-            ),
-            make=_obstacle,
-            remark=lambda outputs: outputs["obstacle"].name,
-        ),
-        node_of("place"),
-        Definition(
-            "sensitivity",
-            "Sensitivity",
-            PLACE,
-            "the map of how much stiffness anywhere disturbs the motion, and its largest value in mm",
-            (_TAKES_STUDY,),
-            (Output("field", "field", "sensitivity.vtu"), Output("largest", "number", "largest, in mm")),
-            make=_sensitivity,
-            remark=lambda outputs: f"up to {outputs['largest']:.3g} mm",
-        ),
-        Definition(
-            "light",
-            "Light",
-            PLACE,
-            "the signal of a waveguide along every path, and the largest per degree of bending",
-            (_TAKES_STUDY,),
-            (Output("signals", "file", "signals.csv"), Output("largest", "number", "largest, per degree")),
-            make=_light,
-            remark=lambda outputs: f"{outputs['path']}: {outputs['largest']:.3g} per degree",
-        ),
-        Definition(
-            "figure",
-            "Figure of a Study",
-            SIMULATE,
-            "one number of a study",
-            (_TAKES_STUDY,),
-            (Output("number", "number", "the number"),),
-            (setting("figure", FIGURES[0], "which number", choices=FIGURES),),
-            make=_figure,
-            remark=lambda outputs: f"{outputs['number']:.6g}",
-        ),
-        node_of("homogenize"),
-        node_of("check"),
-        node_of("export"),
-        Definition(
-            "gripper",
-            "Gripper",
-            GRASP,
-            "two equal units on a plate",
-            (UNIT,),
-            (Output("gripper", "gripper", "the gripper"),),
-            (
-                setting("path", "alpha4", "path of the waveguides if the unit has none"),
-                *map(Setting, (*describe(Fingers), *describe(Plate))),
-            ),
-            make=_gripper,
-            remark=lambda outputs: "{:.4g} x {:.4g} mm".format(*outputs["gripper"].size_mm),
-        ),
-        node_of("grip"),
-    )
+    unit = node_of("simulate"), obstacle, node_of("place"), sensitivity, light, figure
+    return *unit, *map(node_of, ("homogenize", "check", "export")), gripper, node_of("grip")

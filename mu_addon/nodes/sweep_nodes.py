@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from ..errors import InputError
-from ..graph.definition import Call, Definition, Input, Output, Outputs, setting
+from ..graph.definition import Call, Definition, Input, Output, Outputs, node, setting
 from ..meshing.settings import OF_CONTINUUM
 from ..studies.sweep import StudyTable, number_in
 from ..toml_reader import TomlTable
@@ -23,8 +23,31 @@ def _varied() -> dict[str, bool]:
     return numbers | {FACTOR: False, REFINE: False}
 
 
-def _range(call: Call) -> Outputs:
-    """A range as a line of [vary] in sweep.toml: its name and its table."""
+def _range_remark(outputs: Outputs) -> str:
+    name, table = outputs["range"]
+    if "values" in table:
+        return f"{name}: {', '.join(f'{v:g}' for v in table['values'])}"
+    return f"{name}: {table['low']:g} to {table['high']:g}"
+
+
+@node(
+    STUDY,
+    outputs=(Output("range", "range", "the values"),),
+    settings=(
+        setting(
+            "parameter", "chambers.wall_mm", "which parameter, by section and name", choices=tuple(_varied())
+        ),
+        setting("low", 0.8, "the lowest value, in the parameter's unit", low=-1e6, high=1e6),
+        setting("high", 1.0, "the highest value", low=-1e6, high=1e6),
+        setting("steps", 3, "how many values a grid has", low=2, high=1000),
+        setting("log", False, "sample evenly in the logarithm"),
+        setting("values", "", "values in place of low and high, such as 0.8 0.9 1.0"),
+    ),
+    muting="the parameter is not varied",
+    remark=_range_remark,
+)
+def range_(call: Call) -> Outputs:
+    """Values of one parameter, for a parameter study."""
     from ..studies.parameter_study.variable import variable
 
     s = call.settings
@@ -49,15 +72,19 @@ def _number(value: float, whole: bool) -> float | int:
     return int(value)
 
 
-def _range_remark(outputs: Outputs) -> str:
-    name, table = outputs["range"]
-    if "values" in table:
-        return f"{name}: {', '.join(f'{v:g}' for v in table['values'])}"
-    return f"{name}: {table['low']:g} to {table['high']:g}"
-
-
-def best_of(call: Call) -> Outputs:
-    """Unit, figure and number of the point whose figure is largest or smallest; raises InputError."""
+@node(
+    STUDY,
+    (Input("table", ("study table",), "link a node Parameter Study"),),
+    (Output("unit", "unit", "its unit"), Output("number", "number", "its figure")),
+    (
+        setting("figure", "angle_range_deg", "column of the table"),
+        setting("goal", GOALS[0], "which of them", choices=GOALS),
+    ),
+    label="Best of a Study",
+    remark=lambda outputs: f"point {outputs['point']}: {outputs['number']:.6g}",
+)
+def best(call: Call) -> Outputs:
+    """The study whose figure is largest or smallest: its unit, and the figure."""
     from ..studies.parameter_study.variable import changed_inputs
 
     table: StudyTable = call.inputs["table"]
@@ -74,43 +101,4 @@ def best_of(call: Call) -> Outputs:
 
 def sweep_nodes() -> tuple[Definition, ...]:
     """Definitions of the nodes of parameter studies."""
-    return (
-        Definition(
-            "range",
-            "Range",
-            STUDY,
-            "values of one parameter, for a parameter study",
-            outputs=(Output("range", "range", "the values"),),
-            settings=(
-                setting(
-                    "parameter",
-                    "chambers.wall_mm",
-                    "which parameter, by section and name",
-                    choices=tuple(_varied()),
-                ),
-                setting("low", 0.8, "the lowest value, in the parameter's unit", low=-1e6, high=1e6),
-                setting("high", 1.0, "the highest value", low=-1e6, high=1e6),
-                setting("steps", 3, "how many values a grid has", low=2, high=1000),
-                setting("log", False, "sample evenly in the logarithm"),
-                setting("values", "", "values in place of low and high, such as 0.8 0.9 1.0"),
-            ),
-            make=_range,
-            muting="the parameter is not varied",
-            remark=_range_remark,
-        ),
-        node_of("sweep"),
-        Definition(
-            "best",
-            "Best of a Study",
-            STUDY,
-            "the study whose figure is largest or smallest: its unit, and the figure",
-            (Input("table", ("study table",), "link a node Parameter Study"),),
-            (Output("unit", "unit", "its unit"), Output("number", "number", "its figure")),
-            (
-                setting("figure", "angle_range_deg", "column of the table"),
-                setting("goal", GOALS[0], "which of them", choices=GOALS),
-            ),
-            make=best_of,
-            remark=lambda outputs: f"point {outputs['point']}: {outputs['number']:.6g}",
-        ),
-    )
+    return range_, node_of("sweep"), best

@@ -122,7 +122,7 @@ def test_the_best_study_gives_its_unit_whatever_failed_beside_it(tmp_path):
     assert found.columns == ("mass_g", "angle_range_deg")
 
     def best(**settings):
-        return sweep_nodes.best_of(call("best", {"table": found}, **settings))
+        return sweep_nodes.best.make(call("best", {"table": found}, **settings))
 
     assert best(figure="mass_g")["unit"].unit.chambers.wall_mm == 1.0
     least = best(figure="mass_g", goal="smallest")
