@@ -22,7 +22,6 @@ if TYPE_CHECKING:
     from .evaluation import Evaluation as Evaluation
     from .evaluation import Kept as Kept
     from .evaluation import Order as Order
-    from .evaluation import Record as Record
     from .evaluation import State as State
     from .tree import Node as Node
     from .tree import NodeTree as NodeTree

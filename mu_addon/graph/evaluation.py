@@ -21,7 +21,7 @@ from ..run.cache import key as hashed
 from ..run.inputs import digest
 from ..run.study import Study
 from .check import Fault, faults
-from .definition import FILE, FOLDER, Call, Definition, Definitions, Outputs
+from .definition import FILE, FOLDER, NUMBER, Call, Definition, Definitions, Outputs
 from .tree import Node, NodeTree, Source
 
 COMPUTED, CACHED, WAITING, FAILED, BLOCKED, MUTED = (
@@ -91,24 +91,11 @@ class Runs(Protocol):
 
 
 @attrs.frozen
-class Record:
-    """Record of an evaluated node: a remark on its outputs, its numeric outputs, folder of its run.
-
-    cost_s: seconds it took to compute.
-    """
-
-    remark: str = ""
-    cost_s: float = 0.0
-    numbers: Mapping[str, float] = attrs.field(factory=dict)
-    folder: Path | None = None
-
-
-@attrs.frozen
 class State:
     """State of a node after evaluation: its seconds, its key and a remark on its outputs.
 
-    cost_s: seconds when it was computed, now or before; folder: of its run; error: why it failed; because:
-    the node that failed or that it waits for.
+    cost_s: seconds when it was computed, now or before; folder: of its run; numbers: its numeric outputs;
+    error: why it failed; because: the node that failed or that it waits for.
     """
 
     state: str
@@ -117,6 +104,7 @@ class State:
     key: str = ""
     remark: str = ""
     folder: Path | None = None
+    numbers: Mapping[str, float] = attrs.field(factory=dict)
     error: MuError | None = None
     because: str = ""
 
@@ -160,7 +148,7 @@ class Evaluation:
     definitions: Definitions
     runs: Runs | None = None
     kept: Kept = attrs.field(factory=Kept)
-    records: Mapping[str, Record] = attrs.field(factory=dict)
+    records: Mapping[str, State] = attrs.field(factory=dict)
     report: Report = lambda name, state: None
     states: dict[str, State] = attrs.field(factory=dict)
     outputs: dict[str, Outputs] = attrs.field(factory=dict)
@@ -247,8 +235,7 @@ class Evaluation:
         if found is None:
             self._set(name, State(WAITING, key=key, because=self.states[behind].because if behind else name))
         else:
-            state = State(CACHED, cost_s=found.cost_s, key=key, remark=found.remark, folder=found.folder)
-            self._set(name, state)
+            self._set(name, attrs.evolve(found, state=CACHED, seconds=0.0, key=key))
 
     def _of_call(self, name: str, definition: Definition, call: Call, key: str, start: float) -> None:
         found: tuple[Outputs, float] | None = self.kept.get(key)
@@ -278,7 +265,8 @@ class Evaluation:
 
     def _done(self, name: str, definition: Definition, outputs: Outputs, state: State) -> None:
         self.outputs[name] = outputs
-        self._set(name, attrs.evolve(state, remark=definition.remark(outputs)))
+        numbers = {o.name: float(outputs[o.name]) for o in definition.outputs if o.type == NUMBER}
+        self._set(name, attrs.evolve(state, remark=definition.remark(outputs), numbers=numbers))
 
     def _failed(self, name: str, error: MuError, key: str, seconds: float) -> None:
         cause = error.node if isinstance(error, NodeError) else ""
@@ -319,8 +307,7 @@ class Evaluation:
         """A number from another node; None where a refresh cannot determine it."""
         if source.node in self.outputs:
             return self.outputs[source.node][source.output]
-        record = self.records.get(self.states[source.node].key)
-        return None if record is None else record.numbers.get(source.output)
+        return self.states[source.node].numbers.get(source.output)
 
     def _call(self, name: str, node: Node, definition: Definition, settings: dict[str, Any]) -> Call:
         inputs: dict[str, Any] = {}

@@ -9,8 +9,7 @@ from typing import Any
 from ..errors import InputError
 from ..files import write_json
 from ..reading import file_bytes, is_number, parse_json
-from .definition import NUMBER, Definition, Outputs
-from .evaluation import Record, State
+from .evaluation import CACHED, State
 
 FOLDER = "nodes"
 """Folder of the runs within that of the tree."""
@@ -19,14 +18,8 @@ NAME = "records.json"
 LONGEST, MOST_RECORDS = 1 << 24, 5000
 
 
-def record_of(definition: Definition, outputs: Outputs, state: State) -> Record:
-    """Record of an evaluated node."""
-    numbers = {o.name: float(outputs[o.name]) for o in definition.outputs if o.type == NUMBER}
-    return Record(state.remark, state.cost_s, numbers, state.folder)
-
-
-def read_records(folder: Path) -> dict[str, Record]:
-    """Records by key of a tree's folder, without those whose run is missing or that are invalid."""
+def read_records(folder: Path) -> dict[str, State]:
+    """States of nodes by key of a tree's folder, without those whose run is missing or that are invalid."""
     try:
         found = parse_json(file_bytes(folder / FOLDER / NAME, LONGEST), NAME)
     except (OSError, InputError):
@@ -38,7 +31,7 @@ def read_records(folder: Path) -> dict[str, Record]:
     return {key: record for key, record in records.items() if record is not None}
 
 
-def write_records(folder: Path, records: Mapping[str, Record]) -> None:
+def write_records(folder: Path, records: Mapping[str, State]) -> None:
     """Write records by key into a tree's folder, the latest last. Raises OutputError."""
     latest = list(records.items())[-MOST_RECORDS:]
     tables = {
@@ -53,7 +46,7 @@ def write_records(folder: Path, records: Mapping[str, Record]) -> None:
     write_json(folder / FOLDER / NAME, {"format": 1, "records": tables})
 
 
-def _record(table: Any, folder: Path) -> Record | None:
+def _record(table: Any, folder: Path) -> State | None:
     if not isinstance(table, dict):
         return None
     remark, numbers, run = table.get("remark", ""), table.get("numbers", {}), table.get("run")
@@ -63,8 +56,8 @@ def _record(table: Any, folder: Path) -> Record | None:
     if not is_number(cost):
         return None
     if run is None:
-        return Record(remark, cost, numbers)
+        return State(CACHED, cost_s=cost, remark=remark, numbers=numbers)
     # A name alone: a path out of the folder is no run of this tree.
     if not isinstance(run, str) or Path(run).name != run or not (folder / FOLDER / run).is_dir():
         return None
-    return Record(remark, cost, numbers, folder / FOLDER / run)
+    return State(CACHED, cost_s=cost, remark=remark, folder=folder / FOLDER / run, numbers=numbers)

@@ -97,7 +97,7 @@ class Graph(Study):
         A node that fails does not keep others from being evaluated. Raises InputError for a tree with a
         fault, and at the end the first error of a node.
         """
-        from ..graph.records import read_records, record_of, write_records
+        from ..graph.records import read_records, write_records
         from ..report.study_report import write_page
         from ..run.shown import Shown
         from .definitions import definitions
@@ -115,8 +115,7 @@ class Graph(Study):
         def report(name: str, state: trees.State) -> None:
             if state.state in trees.MADE and name in found.outputs:
                 records.pop(state.key, None)
-                definition = definitions()[self.tree.nodes[name].kind]
-                records[state.key] = record_of(definition, found.outputs[name], state)
+                records[state.key] = state
                 write_records(folder, records)
             show()
 

@@ -4,7 +4,7 @@ import attrs
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from mu_addon.graph import Evaluation, Kept, NodeTree, Record
+from mu_addon.graph import Evaluation, Kept, NodeTree, State
 
 from .toys import DEFINITIONS, node, tree
 
@@ -142,12 +142,12 @@ def test_a_refresh_starts_no_run_and_knows_what_records_know():
     refresh = Evaluation(found, definitions)
     refresh.run()
     assert [refresh.states[n].state for n in "art"] == ["computed", "waiting", "waiting"]
-    records = {refresh.states["r"].key: Record("four")}
+    records = {refresh.states["r"].key: State("cached", remark="four")}
     again = Evaluation(found, definitions, records=records)
     again.run()
     assert [again.states[n].state for n in "art"] == ["computed", "cached", "waiting"]
     assert again.states["r"].remark == "four"
-    records[again.states["t"].key] = Record("eight")
+    records[again.states["t"].key] = State("cached", remark="eight")
     last = Evaluation(found, definitions, records=records)
     last.run()
     assert last.states["t"].remark == "eight"

@@ -8,7 +8,7 @@ from mu_addon.design.quantity import described
 from mu_addon.errors import MuError
 from mu_addon.files import write_text
 from mu_addon.graph import Definition, Evaluation, Input, Order, Output, Setting
-from mu_addon.graph.records import read_records, record_of, write_records
+from mu_addon.graph.records import read_records, write_records
 from mu_addon.nodes.runs import FolderRuns, Stopped
 from mu_addon.run.cache import Cache
 from mu_addon.run.study import Node, Study, setting
@@ -128,11 +128,7 @@ def test_a_run_takes_up_the_cache_of_the_one_it_goes_on_from(toy, tmp_path):
 
 def test_records_go_through_their_file_without_runs_that_are_gone(toy, tmp_path):
     found = evaluated(tree(a=node("toy", number=3.0), n=node("number", value=2.0)), toy, tmp_path)
-    kinds = definitions(toy)
-    records = {
-        s.key: record_of(kinds[found.tree.nodes[n].kind], found.outputs[n], s)
-        for n, s in found.states.items()
-    }
+    records = {s.key: s for s in found.states.values()}
     assert records[found.states["a"].key].numbers == {"twice": 6.0}
     write_records(tmp_path, records)
     read = read_records(tmp_path)

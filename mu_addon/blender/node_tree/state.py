@@ -16,7 +16,7 @@ import attrs
 import bpy
 
 from ...errors import InputError, MuError
-from ...graph.evaluation import FAILED, Evaluation, Kept, Record, State
+from ...graph.evaluation import FAILED, Evaluation, Kept, State
 from ...graph.records import FOLDER, read_records
 from ...graph.records import NAME as RECORDS
 from ...graph.tree import Source
@@ -41,7 +41,7 @@ SCENE_KEY = "mu_node_trees"
 """Custom property of the scene that points to its trees: Blender evaluates drivers only of reachable data."""
 
 _kept = Kept()
-_records: FileCache[dict[str, Record]] = FileCache()
+_records: FileCache[dict[str, State]] = FileCache()
 _pending: set[int] = set()
 _refreshed: dict[int, float] = {}
 _written: dict[int, int] = {}
