@@ -86,13 +86,13 @@ class Table:
 
 @attrs.frozen
 class File:
-    """A file of the run's folder; make: its bytes or text, or None if it wrote the path that it is given.
+    """A file of the run's folder; make: its bytes or text, or what makes them or writes the path.
 
     of: what it is made of: a file, or a folder of files, that takes long is not made again of the same.
     """
 
     name: str
-    make: Callable[[Path], bytes | str | None]
+    make: bytes | str | Callable[[Path], bytes | str | None]
     of: Any = None
 
 

@@ -84,7 +84,7 @@ class Shown:
         of = "" if file.of is None else content(file.of)
         if of and self._written.get(file.name) == of:
             return
-        made = file.make(self.folder / file.name)
+        made = file.make(self.folder / file.name) if callable(file.make) else file.make
         self.open()
         of = of or digest(made or "")
         if made is not None and self._written.get(file.name) != of:

@@ -180,10 +180,6 @@ class Exported:
             "read_back": self.read_back,
         }
 
-    def written(self, path: Path) -> bytes:
-        """What its file holds."""
-        return self.content
-
 
 @attrs.frozen(eq=False)
 class Made:
@@ -406,7 +402,7 @@ class Export(Study):
         files, rows = [*plugs, *(one for found in made.values() for one in found.files)], []
         for one in files:
             mb, back = f"{len(one.content) / 1e6:.2f}", one.read_back
-            yield File(one.name, one.written)
+            yield File(one.name, one.content)
             yield from echo(f"{one.name}: {mb} MB, read back and verified")
             error = f"{back['volume_error']:+.1e}" if "volume_error" in back else "-"
             volume = back.get("volume_mm3", back.get("frusta_mm3"))

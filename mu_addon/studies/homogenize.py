@@ -426,7 +426,7 @@ class Homogenize(Study):
     ) -> Iterator[Part]:
         """The block's stress-strain curves and moduli."""
         if block is not None:
-            yield File("specimen.stl", lambda path: block)
+            yield File("specimen.stl", block)
         if not tests:
             return
         rows: list[tuple[str, ...]] = []
@@ -506,7 +506,7 @@ class Homogenize(Study):
         if fit is None:
             return
         if effective is not None:
-            yield File("effective.toml", lambda path: effective)
+            yield File("effective.toml", effective)
         yield recorded("law.misfit", attrs.asdict(fit.misfit))
         small = {"E_kPa": 1e3 * fit.E_MPa, "poisson": fit.poisson, "C44_kPa": 1e3 * fit.C44_MPa}
         yield recorded("law.small_strain", small)

@@ -339,8 +339,8 @@ class Optimize(Study):
         body = design.body
         own = {p: attrs.evolve(design.unit_of(o.design), name=f"proposed-{p}") for p, o in observed.items()}
         for place, unit in own.items():
-            yield File(f"proposed-{place}.toml", _made(designs.to_toml, unit))
-            yield File(f"proposed-{place}.png", _made(charts.picture, unit, body))
+            yield File(f"proposed-{place}.toml", designs.to_toml(unit))
+            yield File(f"proposed-{place}.png", lambda path, unit=unit: charts.picture(unit, body))  # type: ignore[misc]
         titles = {f"{place}: {_state(checked[place])}": unit for place, unit in own.items()}
         size = charts.sizes([design.unit, *own.values()], body)
         yield Beside(
@@ -439,11 +439,6 @@ class Optimize(Study):
             "extended model": model is not None,
         }
         yield Table("", ["setting", ""], list(facts.items()))
-
-
-def _made(make: Callable[..., Any], *arguments: Any) -> Callable[[Any], Any]:
-    """What makes a file, without its path."""
-    return lambda path: make(*arguments)
 
 
 def _proposed(

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Iterator, Mapping
-from pathlib import Path
 from typing import Any
 
 import attrs
@@ -48,10 +47,6 @@ class Printed:
     stl: bytes
     volume_mm3: float
     size_mm: tuple[float, ...]
-
-    def written(self, path: Path) -> bytes:
-        """What its file holds."""
-        return self.stl
 
 
 @attrs.frozen(kw_only=True, eq=False)
@@ -139,7 +134,7 @@ class Specimens(Study):
         for name, made in printed.items():
             one = parts[name]
             mass = made.volume_mm3 / 1e3 * material.density_g_per_ml
-            yield File(f"{name}.stl", made.written)
+            yield File(f"{name}.stl", made.stl)
             yield from echo(f"{name}.stl: {mass:.2f} g, {one.measure}")
             rows.append(
                 {
