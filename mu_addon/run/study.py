@@ -73,8 +73,9 @@ class Input:
     place; required: no command does without the option; repeated: the option may stand several times, and
     the value is a list; metavar: stands for its value there; many: it takes several words, or so many;
     alone: its value where the option stands without one; path: "file" or "folder" if it names one; group:
-    title over its option in help; target: the first of a study's targets that has it.
-    An input of another kind overrides `made`, `write` and `read`.
+    title over its option in help; target: the first of a study's targets that has it; value: makes the input
+    of its plain value, where they differ, and raises InputError. An input of another kind overrides `made`,
+    `write` and `read`.
     """
 
     kind: str
@@ -90,10 +91,11 @@ class Input:
     path: str = ""
     group: str = ""
     target: str = ""
+    value: Callable[[Any], Any] | None = None
 
     def made(self, values: tuple[Any, ...], given: Mapping[str, Any]) -> Any:
         """The input of its plain values; given: the inputs before it. Raises InputError."""
-        return values[0]
+        return values[0] if self.value is None else self.value(values[0])
 
     def write(self, name: str, value: Any) -> Written:
         """The value in the inputs' files; an attrs class is a table."""

@@ -6,7 +6,7 @@ Missing information is asked for; without it only the page on the read files is 
 from __future__ import annotations
 
 import re
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from functools import partial
 from pathlib import Path
 from typing import Any
@@ -32,21 +32,15 @@ _HEIGHTS = "\u2581\u2582\u2583\u2584\u2585\u2586\u2587\u2588"
 Ask = Callable[["lab_files.Understood"], Mapping[str, str] | None]
 
 
-@attrs.frozen
-class AnswersInput(Input):
-    """Answers to questions by their keys, each as KEY=VALUE."""
-
-    kind: str = "answers"
-
-    def made(self, values: tuple[Any, ...], given: Mapping[str, Any]) -> dict[str, str]:
-        """The answers; raises InputError for one without a key."""
-        answers = {}
-        for words in values[0] or ():
-            key, equals, value = words.partition("=")
-            if not equals or not key.strip():
-                raise InputError(f"{words!r} is not an answer", "--set", "write it as KEY=VALUE")
-            answers[key.strip()] = value.strip()
-        return answers
+def _answers(given: Sequence[str] | None) -> dict[str, str]:
+    """Answers to questions by their keys, each as KEY=VALUE; raises InputError for one without a key."""
+    answers = {}
+    for words in given or ():
+        key, equals, value = words.partition("=")
+        if not equals or not key.strip():
+            raise InputError(f"{words!r} is not an answer", "--set", "write it as KEY=VALUE")
+        answers[key.strip()] = value.strip()
+    return answers
 
 
 def _seconds(each: float) -> Callable[[Import], float]:
@@ -74,12 +68,14 @@ class Import(Study):
         many=True,
     )
     answers: dict[str, str] = asked(
-        AnswersInput,
+        Input,
         "answers",
         "answer to a question, such as kind=coupon, section_mm=12.5x3, length_mm=40, unit.Load=N, "
         "column.Ch1=force, column.2=none, decimal=, or, for one experiment alone, NAME.KEY=VALUE. Name a "
         "column by its title or its number. Repeat the option for each answer",
         empty=attrs.Factory(dict),
+        kind="answers",
+        value=_answers,
         option="set",
         repeated=True,
         metavar="KEY=VALUE",

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator
 from importlib import import_module
 from importlib.util import find_spec
 from pathlib import Path
@@ -16,17 +16,6 @@ from ..errors import InputError
 from ..run.parts import File, Part, Sentence, Warn, recorded
 from ..run.study import Input, Study, derived, given, section, setting, stage
 from .inputs import PlaceInput, asked
-
-
-@attrs.frozen
-class BenchInput(Input):
-    """Description of a video, in a file."""
-
-    kind: str = "bench"
-
-    def made(self, values: tuple[Any, ...], given: Mapping[str, Any]) -> measured.Bench:
-        """The description in a file; raises InputError."""
-        return measured.read_bench(Path(values[0]))
 
 
 @attrs.frozen(eq=False)
@@ -59,10 +48,12 @@ class Track(Study):
         argument="CLIP",
     )
     bench: measured.Bench = asked(
-        BenchInput,
+        Input,
         "markers",
         "description of the video, a TOML file: camera, base, tip, scale and markers",
         empty=attrs.NOTHING,
+        kind="bench",
+        value=lambda file: measured.read_bench(Path(file)),
         metavar="FILE",
         required=True,
     )

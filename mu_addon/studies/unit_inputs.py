@@ -8,12 +8,11 @@ from typing import Any
 
 import attrs
 
-from .. import design, fem, meshing
+from .. import design, fem
 from .. import simulate_and_place as core
 from ..design.quantity import described
 from ..design.settings import FRICTION
 from ..errors import InputError
-from ..meshing.settings import REFINE
 from ..run.study import Found, Input, Written
 from ..sensing.optics import Optics
 from ..simulate_and_place.settings import PROTOCOL
@@ -154,41 +153,11 @@ class EffectsInput(Input):
         return core.NamedEffects(found.keys.pop(name, {}), turn, f"{found.path}, [simulate.effects]")
 
 
-@attrs.frozen
-class MeshInput(Input):
-    """Part and fineness of the analysis mesh."""
-
-    kind: str = "mesh"
-    descriptions: tuple[Any, ...] = (REFINE,)
-    metavar: str = "F"
-    target: str = "simulate"
-
-    def made(self, values: tuple[Any, ...], given: Mapping[str, Any]) -> meshing.MeshSettings:
-        """Settings of a refinement."""
-        return meshing.MeshSettings(refine=values[0])
-
-
-@attrs.frozen
-class OpticsInput(Input):
-    """Optical constants of the resin."""
-
-    kind: str = "optics"
-    descriptions: tuple[Any, ...] = (LIGHT,)
-    option: str = "light"
-    many: bool = True
-    metavar: str = "NAME=VALUE"
-    target: str = "place"
-
-    def made(self, values: tuple[Any, ...], given: Mapping[str, Any]) -> Optics:
-        """The assumed constants, changed by pairs; raises InputError."""
-        return optics_of(values[0] or ())
-
-
-def optics_of(words: Sequence[str]) -> Optics:
+def optics_of(words: Sequence[str] | None) -> Optics:
     """The resin's optics, changed by NAME=VALUE pairs; raises InputError."""
     names = [field.name for field in attrs.fields(Optics)]
     values: dict[str, float] = {}
-    for word in words:
+    for word in words or ():
         name, _, value = word.partition("=")
         try:
             values[name] = float(value)

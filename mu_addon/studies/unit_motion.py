@@ -15,12 +15,12 @@ from ..design.quantity import described
 from ..design.settings import QUALITY, USUAL_RESIN
 from ..errors import InputError
 from ..fem.device import DEVICE, known_device
-from ..meshing.settings import SELF_CONTACT
+from ..meshing.settings import REFINE, SELF_CONTACT, MeshSettings
 from ..run.parts import File, Part, Sentence, Warn, csv, recorded
 from ..run.study import Input, Members, Over, Study, Tell, given, intermediate, section, setting, stage
 from ..simulate_and_place.settings import SELF_FRICTION, TIMES, UNDER_PRESSURE, WORKERS
 from .inputs import OnceInput, UnitInput, asked
-from .unit_inputs import BodyInput, EffectsInput, MeshInput, ObstaclesInput, ProtocolInput, grasp
+from .unit_inputs import BodyInput, EffectsInput, ObstaclesInput, ProtocolInput, grasp
 
 AROUND, SOLVER = "unit and surroundings", "mesh and solver"
 STAGES = ("design", "simulate", "place")
@@ -122,7 +122,10 @@ class UnitMotion(Study):
         converter=lambda name: name or "",
     )
     protocol: fem.Protocol = given(ProtocolInput(), factory=grasp)
-    mesh: meshing.MeshSettings = given(MeshInput(), factory=lambda: meshing.MeshSettings())
+    mesh: meshing.MeshSettings = given(
+        Input("mesh", (REFINE,), metavar="F", target="simulate", value=lambda f: MeshSettings(refine=f)),
+        factory=MeshSettings,
+    )
     resin: str | None = asked(
         OnceInput,
         "wall_resin",

@@ -16,6 +16,7 @@ from ..run.parts import Part, Sentence, Warn, recorded
 from ..run.study import (
     Dropped,
     Growth,
+    Input,
     Members,
     Node,
     Over,
@@ -31,7 +32,7 @@ from ..sensing.optics import Optics
 from ..simulate_and_place.settings import ALL_PATHS, CHECKS, MESH_CHECK, PATHS, QUICK, QUICK_REFINE, STATIONS
 from .inputs import OnceInput
 from .parameter_study.results import angles_of
-from .unit_inputs import OpticsInput
+from .unit_inputs import LIGHT, optics_of
 from .unit_motion import SOLVER, UnitMotion, state_message, state_sought, taking
 
 LATTICE = "paths, and limits of --paths graph"
@@ -203,7 +204,18 @@ class UnitStudy(UnitMotion):
     mesh_check: bool = setting(MESH_CHECK, group=SOLVER, target="place")
     all_paths: bool = setting(ALL_PATHS, decides=False, group=SOLVER, target="place")
     paths: str = setting(PATHS, group=LATTICE, target="place")
-    optics: Optics = given(OpticsInput(group=LATTICE), factory=Optics)
+    optics: Optics = given(
+        Input(
+            "optics",
+            (LIGHT,),
+            many=True,
+            metavar="NAME=VALUE",
+            group=LATTICE,
+            target="place",
+            value=optics_of,
+        ),
+        factory=Optics,
+    )
     shortest_cells: float = setting(SHORTEST, metavar="C", group=LATTICE, target="place")
     longest_cells: float = setting(LONGEST, metavar="C", group=LATTICE, target="place")
     bend_deg: float = setting(BEND, metavar="A", group=LATTICE, target="place")
