@@ -26,27 +26,28 @@ AROUND, SOLVER = "unit and surroundings", "mesh and solver"
 STAGES = ("design", "simulate", "place")
 
 
-def _wants(target: str) -> Any:
-    return lambda study: target in study.stages
+def wants(target: str, in_time: bool | None = None, also: str = "") -> Any:
+    """What says of a study if it has a target.
+
+    in_time: and its motion is solved instant by instant, or is not; also: and that input is set.
+    """
+
+    def wanted(study: Any) -> bool:
+        so = target in study.stages and (in_time is None or study.in_time == in_time)
+        return so and (not also or bool(getattr(study, also)))
+
+    return wanted
 
 
-def _simulates_by_pressure(study: UnitMotion) -> bool:
-    return "simulate" in study.stages and not study.in_time
-
-
-def _simulates_in_time(study: UnitMotion) -> bool:
-    return "simulate" in study.stages and study.in_time
-
-
-def taking(title: str) -> Any:
-    """Expected seconds of a stage of that title, of a study."""
+def timed(title: str, of: str = "", **more: Any) -> Any:
+    """A stage with the expected seconds of that title, or of another one; more: of the `Stage`."""
 
     def seconds(study: Any) -> float:
         from ..simulate_and_place.expected import seconds
 
-        return seconds(study, title)
+        return seconds(study, of or title)
 
-    return seconds
+    return stage(title, seconds, **more)
 
 
 def _visited(study: UnitMotion) -> list[float]:
@@ -275,14 +276,14 @@ class UnitMotion(Study):
 
     # Design.
 
-    @stage("solid", taking("solid"), kept=False)
+    @timed("solid", kept=False)
     def solid(self, unit: design.Unit, quality: str, body: design.Body | None) -> design.Solid:
         """The printable unit without a sensor."""
         return design.build_solid(unit, None, quality, body)
 
-    @stage(
+    @timed(
         "solid with {path}",
-        taking("solid with the best path"),
+        "solid with the best path",
         over=Over(("path",), lambda study: [study.path]),
         wanted=lambda study: bool(study.path),
         kept=False,
@@ -295,7 +296,7 @@ class UnitMotion(Study):
 
     # Motion.
 
-    @stage("mesh", taking("mesh"), wanted=_wants("simulate"))
+    @timed("mesh", wanted=wants("simulate"))
     def meshed(
         self,
         shape: design.Unit,
@@ -309,7 +310,7 @@ class UnitMotion(Study):
         tell.made(f"{len(found.nodes)} nodes and {len(found.tets)} elements")
         return found
 
-    @stage("mesh", taking("mesh"), wanted=_wants("simulate"))
+    @timed("mesh", wanted=wants("simulate"))
     def mesh_quality(
         self, meshed: meshing.Mesh, unit: design.Unit, body: design.Body | None
     ) -> meshing.Quality:
@@ -323,13 +324,12 @@ class UnitMotion(Study):
         """Solver of the unit without a sensor."""
         return mechanics.equilibrium(meshed)
 
-    @stage(
+    @timed(
         "Model A",
-        taking("Model A"),
         over=Over(
             ("pressure_kPa",), _visited, needs=lambda study, pressure: {"states": before(study, pressure)}
         ),
-        wanted=_simulates_by_pressure,
+        wanted=wants("simulate", in_time=False),
         parallel=True,
         says=state_message,
         doing=state_sought,
@@ -338,7 +338,7 @@ class UnitMotion(Study):
         """The state at a pressure, from those before it on the same side of rest."""
         return core.state_after(equilibrium, pressure_kPa, [*states.values()])
 
-    @stage("Model A", taking("Model A"), wanted=_simulates_in_time, kept=False)
+    @timed("Model A", wanted=wants("simulate", in_time=True), kept=False)
     def instants(
         self, equilibrium: fem.Equilibrium, mechanics: core.Mechanics, samples: core.Samples, tell: Tell
     ) -> core.InTime:
@@ -362,7 +362,7 @@ class UnitMotion(Study):
             raise instants.error
         return core.motion_in_time(meshed, samples, instants)
 
-    @stage("Model A", taking("Model A"), wanted=_wants("simulate"))
+    @timed("Model A", wanted=wants("simulate"))
     def motion_tables(
         self,
         motion: fem.Trajectory,
@@ -373,7 +373,7 @@ class UnitMotion(Study):
         """Stretch of every state, and walls that pass through each other."""
         return core.tables_of(mechanics, motion, tell.cache)
 
-    @stage("Model A", taking("Model A"), wanted=_wants("simulate"), kept=False)
+    @timed("Model A", wanted=wants("simulate"), kept=False)
     def fields(
         self,
         motion: fem.Trajectory,

@@ -26,14 +26,13 @@ from ..run.study import (
     intermediate,
     section,
     setting,
-    stage,
 )
 from ..sensing.optics import Optics
 from ..simulate_and_place.settings import ALL_PATHS, CHECKS, MESH_CHECK, PATHS, QUICK, QUICK_REFINE, STATIONS
 from .inputs import OnceInput
 from .parameter_study.results import angles_of
 from .unit_inputs import LIGHT, optics_of
-from .unit_motion import SOLVER, UnitMotion, state_message, state_sought, taking
+from .unit_motion import SOLVER, UnitMotion, state_message, state_sought, timed, wants
 
 LATTICE = "paths, and limits of --paths graph"
 COARSER = 0.7
@@ -42,24 +41,9 @@ PATHS_CHECKED = 3
 """The best paths, which the coarser mesh solves too: only paths near the best can be tied with it."""
 
 
-def _places(study: UnitStudy) -> bool:
-    return "place" in study.stages
-
-
-def _by_pressure(study: UnitStudy) -> bool:
-    return "place" in study.stages and not study.in_time
-
-
-def _in_time(study: UnitStudy) -> bool:
-    return "place" in study.stages and study.in_time
-
-
-def _checks_by_pressure(study: UnitStudy) -> bool:
-    return _by_pressure(study) and study.mesh_check
-
-
-def _checks_in_time(study: UnitStudy) -> bool:
-    return _in_time(study) and study.mesh_check
+_places, _by_pressure, _in_time = wants("place"), wants("place", in_time=False), wants("place", in_time=True)
+_checks_by_pressure = wants("place", in_time=False, also="mesh_check")
+_checks_in_time = wants("place", in_time=True, also="mesh_check")
 
 
 def _searches(study: UnitStudy) -> bool:
@@ -135,7 +119,7 @@ def _solves(wanted: Callable[[UnitStudy], bool], **growing: Any) -> Any:
 
     over = Over(("number", "pressures_kPa"), lambda study: [], _way, _at_pressures, **growing)
     words: Any = {"says": lambda found: core.words_on_solved(found), "doing": _sought}
-    return stage("candidates", taking("candidates"), over=over, wanted=wanted, parallel=True, **words)(solved)
+    return timed("candidates", over=over, wanted=wanted, parallel=True, **words)(solved)
 
 
 @attrs.frozen(kw_only=True, eq=False, slots=False)
@@ -314,9 +298,8 @@ class UnitStudy(UnitMotion):
 
     # An estimate of the ranking.
 
-    @stage(
+    @timed(
         "Model A",
-        taking("Model A"),
         over=Over(
             ("what",), lambda study: ["estimate"], needs=lambda study, _: {"states": _under_pressure(study)}
         ),
@@ -377,9 +360,8 @@ class UnitStudy(UnitMotion):
         found: core.Standing = grown(core.solving(compared, contest, begun), contenders)
         return found
 
-    @stage(
+    @timed(
         "candidates",
-        taking("candidates"),
         over=Over(
             ("number", "pressures_kPa"),
             lambda study: [],
@@ -405,9 +387,8 @@ class UnitStudy(UnitMotion):
 
     # Candidates where history acts.
 
-    @stage(
+    @timed(
         "candidates",
-        taking("candidates"),
         over=Over(("number",), lambda study: study.path_names, gives=_number),
         wanted=_in_time,
         parallel=True,
@@ -444,10 +425,9 @@ class UnitStudy(UnitMotion):
 
     # The mesh check.
 
-    @stage(
+    @timed(
         "mesh check",
-        taking("mesh check"),
-        wanted=lambda study: _places(study) and study.mesh_check,
+        wanted=wants("place", also="mesh_check"),
         failing="The mesh uncertainty is not known: there is no coarser mesh",
         parallel=True,
     )
@@ -474,9 +454,8 @@ class UnitStudy(UnitMotion):
         """Solver of the candidates on the coarser mesh."""
         return core.waveguides_of(mechanics, coarse_mesh, candidate_paths)
 
-    @stage(
+    @timed(
         "mesh check",
-        taking("mesh check"),
         over=Over(("pressure_kPa",), lambda study: [], grows=_extremes_on_coarse, after=("motion",)),
         wanted=_checks_by_pressure,
         failing="The mesh uncertainty is not known at {pressure_kPa:g} kPa: on the coarser mesh",
@@ -488,9 +467,8 @@ class UnitStudy(UnitMotion):
         """The state at an extreme pressure, from rest."""
         return core.state_after(coarse_equilibrium, pressure_kPa, [])
 
-    @stage(
+    @timed(
         "mesh check",
-        taking("mesh check"),
         over=Over(
             ("number", "pressures_kPa"),
             lambda study: [],
@@ -515,9 +493,8 @@ class UnitStudy(UnitMotion):
         """One of the best candidates at the extreme pressures that the coarser mesh reaches."""
         return core.solved(coarse_waveguides, number, [*coarse_states], coarse_states, stations, whole=False)
 
-    @stage(
+    @timed(
         "mesh check",
-        taking("mesh check"),
         wanted=_checks_in_time,
         failing="The mesh uncertainty is not known: on the coarser mesh",
         kept=False,
@@ -537,9 +514,8 @@ class UnitStudy(UnitMotion):
             raise found.error
         return found
 
-    @stage(
+    @timed(
         "mesh check",
-        taking("mesh check"),
         over=Over(
             ("number",), lambda study: [], gives=_number, grows=_best_in_time, after=("first_ranking",)
         ),
@@ -632,9 +608,8 @@ class UnitStudy(UnitMotion):
         """What gives fields of a mesh's states, for display."""
         return core.PathMotions(mechanics, meshed, meshed, states)
 
-    @stage(
+    @timed(
         "motion of the paths",
-        taking("motion of the paths"),
         over=Over(("path",), lambda study: study.path_names),
         wanted=_by_pressure,
         kept=False,
@@ -655,25 +630,14 @@ class UnitStudy(UnitMotion):
         found = {**candidates, **contenders, **(let_in or {})}
         return painter.of(core.differences(path, found, last_standing))
 
-    @stage(
-        "map",
-        taking("map"),
-        wanted=lambda study: _by_pressure(study) and not study.effects.clogged,
-        parallel=True,
-    )
+    @timed("map", wanted=lambda study: _by_pressure(study) and not study.effects.clogged, parallel=True)
     def sensitivity(
         self, motion: fem.Trajectory, mechanics: core.Mechanics, stations: int
     ) -> core.Sensitivity:
         """How much stiffness anywhere in the unit disturbs its motion."""
         return core.sensitivity_map(mechanics, motion, stations)
 
-    @stage(
-        "light",
-        taking("light"),
-        wanted=_by_pressure,
-        failing="The light signal is not available",
-        kept=False,
-    )
+    @timed("light", wanted=_by_pressure, failing="The light signal is not available", kept=False)
     def light(
         self,
         unit: design.Unit,
@@ -688,7 +652,7 @@ class UnitStudy(UnitMotion):
 
     # Every path of the lattice.
 
-    @stage("ranking of the lattice's paths", taking("ranking of the lattice's paths"), wanted=_searches)
+    @timed("ranking of the lattice's paths", wanted=_searches)
     def predicted(
         self,
         motion: fem.Trajectory,
@@ -705,9 +669,8 @@ class UnitStudy(UnitMotion):
         """Model A's motion of the whole body: a path off the mirror plane needs both sides."""
         return core.whole_motion(motion)
 
-    @stage(
+    @timed(
         "check of the best paths",
-        taking("check of the best paths"),
         over=Over(
             ("number",),
             lambda study: [],
@@ -743,7 +706,7 @@ class UnitStudy(UnitMotion):
         """The search's outcome, and every path, the best first."""
         return core.search_of(unit, limits, predicted, checks, lattice_paths)
 
-    @stage("motion of the best path", taking("motion of the best path"), wanted=_searches, kept=False)
+    @timed("motion of the best path", wanted=_searches, kept=False)
     def best_path_motion(
         self,
         search: core.SearchOutcome,
@@ -757,7 +720,7 @@ class UnitStudy(UnitMotion):
 
     # The printable unit.
 
-    @stage("solid with the best path", taking("solid with the best path"), wanted=_places, kept=False)
+    @timed("solid with the best path", wanted=_places, kept=False)
     def solid_best(
         self, unit: design.Unit, quality: str, body: design.Body | None, chosen: str
     ) -> design.Solid:
