@@ -92,6 +92,7 @@ class Compared(Study):
     """Runs side by side, as `compare` shows them."""
 
     name = "compare"
+    # It has no file of inputs, and nothing to resume.
     joins = True
     files = {"compare.csv": "inputs that differ and all results, with differences to the first run's"}
 

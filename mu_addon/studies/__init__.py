@@ -2,29 +2,28 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
 from functools import cache
 from importlib import import_module
 from keyword import iskeyword
 from pkgutil import iter_modules
-from typing import Any
 
 from ..run.study import Study
 
 _ELSEWHERE = dict.fromkeys(("design", "simulate", "place"), ".unit_ranking") | {"graph": "..nodes.graph"}
 """Module of a study that is in no file of its name here."""
-
-
-def _names() -> Iterator[str]:
-    """Names of the studies in files of their own, which declare the file's name; no file is run for that."""
-    for module in iter_modules(__path__):
-        name, finder = module.name.rstrip("_").replace("_", "-"), module.module_finder
-        loader: Any = finder.find_spec(module.name).loader  # type: ignore[call-arg, union-attr]
-        if f'\n    name = "{name}"\n' in loader.get_source(module.name):
-            yield name
-
-
-STUDIES = tuple(sorted((*_ELSEWHERE, *_names())))
+_SHARED = (
+    "inputs",
+    "parameter_study",
+    "starting",
+    "unit_comparison",
+    "unit_inputs",
+    "unit_motion",
+    "unit_ranking",
+    "unit_runs",
+)
+"""Modules here that are no study of their name."""
+_OWN = (m.name.rstrip("_").replace("_", "-") for m in iter_modules(__path__) if m.name not in _SHARED)
+STUDIES = tuple(sorted((*_ELSEWHERE, *_OWN)))
 
 
 @cache
