@@ -7,9 +7,10 @@ from functools import partial
 
 import numpy as np
 
+from ..arrays import Array
 from ..design.block import Block
 from ..design.waveguide import Bar, Seat
-from ..meshing.mesh import LATTICE, Array, Mesh, edges_of, oriented, second_order
+from ..meshing.mesh import LATTICE, Mesh, edges_of, oriented, second_order
 from .lattice import Depth, filled_outside
 
 # A box as six tetrahedra around its diagonal (Kuhn): faces of neighbours are cut alike. A corner is numbered

@@ -7,18 +7,15 @@ their joints stay solid, so that struts act on the wall as solid ones do.
 
 from __future__ import annotations
 
-from typing import Any
-
 import attrs
 import numpy as np
 
+from ..arrays import Array
 from ..design.dimensions import Dimensions
 from ..design.lattice import Lattice, lattice_of
 from ..meshing.mesh import LATTICE, Mesh
 from .joints import Zones, zones_of
 from .octants import SweptNodes
-
-Array = np.ndarray[Any, Any]
 
 REACH = 0.3
 """Layers nearer than this share of a junction's diameter to the parts that support struts stay solid."""

@@ -5,11 +5,11 @@ from __future__ import annotations
 import contextlib
 from collections.abc import Callable, Sequence
 from functools import cached_property
-from typing import Any
 
 import attrs
 import numpy as np
 
+from ..arrays import Array
 from ..design.body import Body
 from ..design.parameters import Unit
 from ..errors import ConvergenceError
@@ -24,8 +24,6 @@ from ..fem.time_stepping import simulate_in_time
 from ..meshing.mesh import Mesh, part
 from .start import eased, started
 from .waveguide import bar_of, with_waveguide
-
-Array = np.ndarray[Any, Any]
 
 EASED_CELLS = 1.0
 """Distance from a waveguide, in cells, within which struts yield to it in a candidate's start."""

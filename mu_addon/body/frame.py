@@ -8,6 +8,7 @@ from pathlib import Path
 import attrs
 import numpy as np
 
+from ..arrays import Array
 from ..design.dimensions import Dimensions
 from ..design.lattice import filled
 from ..design.lattice_kinds import LatticeKind
@@ -18,7 +19,7 @@ from ..fem.stress import exceeded
 from ..homogenize.cell_mesh import CellMeshSettings, cell_materials, mesh_cell
 from ..homogenize.elasticity import Elasticity, strained
 from ..homogenize.octant import SHEARS
-from ..meshing.mesh import Array, Mesh
+from ..meshing.mesh import Mesh
 from .beams import integrals
 from .joints import POISSON, Zones, shape_of
 

@@ -2,19 +2,16 @@
 
 from __future__ import annotations
 
-from typing import Any
-
 import attrs
 import numpy as np
 from scipy.spatial import cKDTree
 
+from ..arrays import Array
 from ..design.dimensions import Dimensions
 from ..design.lattice import Lattice, lattice_of
 from ..errors import InputError
 from ..meshing.mesh import Mesh
 from ..meshing.quality import inverted
-
-Array = np.ndarray[Any, Any]
 
 # Stations of axes among which a point's strut is sought: how many a strut, and how many of them.
 _STATIONS, _NEAR = 10, 24

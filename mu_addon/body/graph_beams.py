@@ -14,9 +14,10 @@ from weakref import WeakKeyDictionary
 import attrs
 import numpy as np
 
+from ..arrays import Array
 from ..design.lattice import Lattice
 from ..fem.elements import even_points, reference_gradients, shape_functions
-from ..meshing.mesh import LATTICE, Array, Mesh, part
+from ..meshing.mesh import LATTICE, Mesh, part
 from .beams import free_joints, integrals, rotation_nodes, whole_and_clear
 from .graph_axes import Axes
 from .joints import Zones

@@ -6,12 +6,13 @@ from pathlib import Path
 
 import numpy as np
 
+from ..arrays import Array
 from ..design.dimensions import Dimensions
 from ..design.lattice import Lattice, lattice_of
 from ..fem.materials import Materials
 from ..fem.model import Model
 from ..fem.stress import PeakStretch
-from ..meshing.mesh import LATTICE, Array
+from ..meshing.mesh import LATTICE
 from .frame import frame_zones, joint_factors, place_in_cell
 from .joints import Zones, concentration_factors, zones_of
 from .strut import is_half_diagonal

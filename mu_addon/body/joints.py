@@ -14,6 +14,7 @@ from functools import lru_cache
 import attrs
 import numpy as np
 
+from ..arrays import Array
 from ..design.dimensions import Dimensions
 from ..design.lattice_kinds import LatticeKind
 from ..fem.beams import SHEAR_FACTOR
@@ -21,7 +22,7 @@ from ..fem.elements import reference_gradients
 from ..fem.materials import Materials
 from ..fem.stress import exceeded
 from ..homogenize.elasticity import Elasticity, strained
-from ..meshing.mesh import Array, Mesh
+from ..meshing.mesh import Mesh
 from .strut import radius_of, strut_mesh
 
 POISSON = 0.45

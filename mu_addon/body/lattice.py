@@ -10,6 +10,7 @@ import numpy as np
 from scipy import sparse
 from scipy.sparse.csgraph import connected_components
 
+from ..arrays import Array
 from ..design import shapes
 from ..design.body import Body, covering
 from ..design.dimensions import Dimensions
@@ -20,7 +21,7 @@ from ..design.solid import QUALITY, lattice_solid
 from ..design.strut_cell import StrutCell
 from ..fem.elements import even_points, reference_gradients, shape_functions, shape_gradients
 from ..homogenize.cell_mesh import CellMeshSettings, mesh_cell
-from ..meshing.mesh import FLIPPED_TET, TET_FACES, Array, Mesh, mirror
+from ..meshing.mesh import FLIPPED_TET, TET_FACES, Mesh, mirror
 from ..meshing.surface import Surface, winding_number
 from ..meshing.tiling import tiled
 from .graph_axes import graded_about_axes

@@ -11,6 +11,7 @@ from __future__ import annotations
 import attrs
 import numpy as np
 
+from ..arrays import Array
 from ..design.body import Body, covering
 from ..design.dimensions import Dimensions
 from ..design.lattice import Lattice, graph_of, with_struts
@@ -18,7 +19,7 @@ from ..design.parameters import Unit
 from ..errors import InputError
 from ..fem.elements import even_points, shape_functions, shape_gradients
 from ..fem.embedding import Footholds
-from ..meshing.mesh import Array, Mesh, mirror
+from ..meshing.mesh import Mesh, mirror
 from ..meshing.morph import shrunk, struts_alone_differ
 from ..meshing.quality import check_positive
 from ..meshing.settings import MeshSettings

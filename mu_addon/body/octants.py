@@ -7,11 +7,11 @@ from typing import NamedTuple
 import attrs
 import numpy as np
 
+from ..arrays import Array
 from ..design.dimensions import Dimensions
 from ..design.lattice import Lattice, graded, lattice_of
 from ..design.waveguide import Bar, strut_radii
 from ..errors import InputError
-from ..meshing.mesh import Array
 from .graph_axes import Axes
 from .strut import Radius, ends, is_half_diagonal, placed, places_of, radius_of, thickened
 

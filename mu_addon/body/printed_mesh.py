@@ -8,12 +8,13 @@ from pathlib import Path
 import attrs
 import numpy as np
 
+from ..arrays import Array
 from ..design.body import Body, covering
 from ..design.dimensions import Dimensions
 from ..design.lattice import lattice_of
 from ..design.parameters import Unit
 from ..fem.embedding import embed
-from ..meshing.mesh import MEMBRANE, Array, Mesh, mirror, second_order
+from ..meshing.mesh import MEMBRANE, Mesh, mirror, second_order
 from ..meshing.quality import check_positive
 from ..meshing.settings import CELL_MM, MeshSettings
 from ..meshing.wall_and_cavity import Membrane, WallGrid

@@ -13,6 +13,7 @@ import math
 import numpy as np
 from scipy import sparse
 
+from ..arrays import Array
 from ..design.dimensions import Dimensions
 from ..design.lattice import graded
 from ..errors import InputError
@@ -20,7 +21,7 @@ from ..fem.embedding import Probe
 from ..fem.materials import Materials
 from ..fem.model import Model
 from ..fem.trajectory import Trajectory
-from ..meshing.mesh import LATTICE, Array, Mesh
+from ..meshing.mesh import LATTICE, Mesh
 from ..placement.graph import Graph
 from ..placement.response import BLOCK, Response, solver_of
 from ..placement.sensitivity_map import loaded, probe_loads, representative_pressures

@@ -4,10 +4,11 @@ from __future__ import annotations
 
 import numpy as np
 
+from ..arrays import Array
 from ..fem.carried_nodes import following
 from ..fem.equilibrium import Equilibrium
 from ..fem.kinematics import mean_gradients, numbers_of
-from ..meshing.mesh import Array, Mesh
+from ..meshing.mesh import Mesh
 
 # Weight of the surroundings' rotation beside the legs of a path.
 _TWIST = 0.05

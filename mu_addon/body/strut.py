@@ -14,9 +14,10 @@ from typing import Protocol
 
 import numpy as np
 
+from ..arrays import Array
 from ..design.lattice_kinds import LatticeKind
 from ..errors import InputError
-from ..meshing.mesh import LATTICE, Array, Mesh, edges_of, oriented, second_order
+from ..meshing.mesh import LATTICE, Mesh, edges_of, oriented, second_order
 
 # Radius in mm of a strut at fractions 0 .. 1 of its way from the cell's corner to its centre, of any shape.
 Radius = Callable[[Array], Array]

@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 from scipy import sparse
 
+from ..arrays import Array
 from ..design.anchors import Window
 from ..design.body import Body, covering
 from ..design.dimensions import Dimensions
@@ -18,7 +19,7 @@ from ..design.parameters import Unit
 from ..design.waveguide import Bar, waveguide
 from ..errors import InputError
 from ..fem.embedding import embed
-from ..meshing.mesh import LATTICE, Array, Mesh, part
+from ..meshing.mesh import LATTICE, Mesh, part
 from ..meshing.quality import check_positive
 from ..meshing.wall_and_cavity import unmovable
 from .bar import bar_mesh, is_own_mirror_image, outside_bar, outside_seat, seat_mesh

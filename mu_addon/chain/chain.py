@@ -3,18 +3,16 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import Any
 
 import attrs
 import numpy as np
 
+from ..arrays import Array
 from ..errors import ConvergenceError, InputError
 from ..fem.rotations import rotation, skew
 from .joint import MOST_RANGE, Joint, JointAt
 from .rigid_motion import exponential, inverse, motion, rotation_vector, slope
 from .unit_between_plates import frame, relative
-
-Array = np.ndarray[Any, Any]
 
 GRAVITY_N_PER_G = 9.80665e-3
 MOST_LINKS = 64

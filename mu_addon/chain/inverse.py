@@ -2,15 +2,12 @@
 
 from __future__ import annotations
 
-from typing import Any
-
 import attrs
 import numpy as np
 
+from ..arrays import Array
 from ..errors import ConvergenceError, InputError
 from .chain import Chain, ChainState
-
-Array = np.ndarray[Any, Any]
 
 # Weight in the minimised sum: 10 MPa against a millimetre, so that of many answers the one with the lowest
 # pressures is taken.

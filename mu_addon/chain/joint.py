@@ -10,10 +10,9 @@ from typing import Any
 import attrs
 import numpy as np
 
+from ..arrays import Array
 from ..errors import InputError
 from .unit_between_plates import PlateState
-
-Array = np.ndarray[Any, Any]
 
 # Share of its range up to which a joint is used with a warning; beyond it no equilibrium is reported.
 MOST_RANGE = 1.5

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any
 import attrs
 import numpy as np
 
+from ..arrays import Array
 from ..errors import ConvergenceError, InputError
 from .joint import Joint, fitted
 from .settings import LOADED, PRESSURE_STEP
@@ -17,7 +18,6 @@ if TYPE_CHECKING:
     from ..design.parameters import Unit
     from ..meshing.mesh import Mesh
 
-Array = np.ndarray[Any, Any]
 
 AXES = ("bend_x", "bend_y", "twist", "shear_x", "shear_y", "stretch")
 # Sampled on both sides; the others' other side is the mirror image.

@@ -4,17 +4,15 @@ from __future__ import annotations
 
 import time
 from collections.abc import Callable, Sequence
-from typing import Any
 
 import attrs
 import numpy as np
 
+from ..arrays import Array
 from ..errors import ConvergenceError
 from .chain import Chain, ChainState
 from .inverse import Reach, reach_point
 from .pressures import Pressures
-
-Array = np.ndarray[Any, Any]
 
 
 @attrs.frozen(eq=False)

@@ -3,15 +3,13 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Any
 
 import attrs
 import numpy as np
 
+from ..arrays import Array
 from ..errors import InputError
 from ..fem.protocol import read_protocol_text
-
-Array = np.ndarray[Any, Any]
 
 
 @attrs.frozen(eq=False)

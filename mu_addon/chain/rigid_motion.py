@@ -9,13 +9,10 @@ Engineering 268 (2014); Murray, Li, Sastry, *A Mathematical Introduction to Robo
 
 from __future__ import annotations
 
-from typing import Any
-
 import numpy as np
 
+from ..arrays import Array
 from ..fem.rotations import rotation, skew
-
-Array = np.ndarray[Any, Any]
 
 # Of the series of a motion's exponential and of its slope: rotations stay below pi, and pi^30/30! is 3e-18.
 _TERMS = 30

@@ -2,17 +2,14 @@
 
 from __future__ import annotations
 
-from typing import Any
-
 import attrs
 import numpy as np
 
+from ..arrays import Array
 from ..meshing.mesh import Mesh
 from .chain import ChainState
 from .joint_learning import Learned
 from .unit_between_plates import frame, spread
-
-Array = np.ndarray[Any, Any]
 
 
 @attrs.frozen(eq=False)

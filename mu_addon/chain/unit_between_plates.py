@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import attrs
 import numpy as np
 
+from ..arrays import Array
 from ..errors import ConvergenceError
 from ..fem import kinematics
 from ..fem.elements import shape_functions, solid_volumes, tet_quadrature
@@ -23,7 +24,6 @@ from .rigid_motion import exponential, inverse, logarithm, motion, rotation_vect
 if TYPE_CHECKING:
     from ..design.parameters import Unit
 
-Array = np.ndarray[Any, Any]
 
 # Smallest share of the way to a placement that is tried.
 _LEAST_SHARE = 1 / 4

@@ -7,9 +7,9 @@ from typing import Any
 
 import attrs
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
-Array = NDArray[np.float64]
+from ..arrays import Array
 
 # Corners of a box as signs along its axes, the last running fastest; and its faces, outward.
 _SIGNS = np.array(list(product((-1.0, 1.0), repeat=3)))

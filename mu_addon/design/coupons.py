@@ -6,15 +6,13 @@ from typing import Any
 
 import attrs
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from . import shapes
 from .dimensions import Dimensions
 from .solid import printable
 from .surface import Triangles, Vertices
 from .waveguide import free_bar
-
-Array = NDArray[np.float64]
 
 GAUGE_MM = 25.0
 """Length of a tension coupon between its shoulders."""

@@ -14,12 +14,11 @@ from typing import Any, ClassVar, NamedTuple
 
 import attrs
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
+from ..arrays import Array
 from .factor_list import LEAST, MOST, FactorList
 from .quantity import quantity, text_quantity
-
-Array = NDArray[np.float64]
 
 ALONG_Z = ("base", "lower", "middle", "upper", "tip")
 """Parameters along the axis, evenly spaced from the middle of the first chamber to that of the last."""

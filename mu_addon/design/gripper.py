@@ -12,8 +12,8 @@ from typing import Any, ClassVar
 
 import attrs
 import numpy as np
-from numpy.typing import NDArray
 
+from ..arrays import Array
 from ..errors import InputError
 from ..reading import text_in
 from ..toml_reader import parsed_toml
@@ -27,8 +27,6 @@ from .quantity import describe, quantity
 from .solid import QUALITY, Solid, build_solid, printable
 from .surface import Triangles, Vertices, area, bad_edges, stl_bytes, stl_surface, volume
 from .waveguide import ROOM, Bar, waveguide
-
-Array = NDArray[np.float64]
 
 KIND = "gripper"
 ROOT = 0.1

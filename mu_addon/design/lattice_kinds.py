@@ -18,11 +18,11 @@ import attrs
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from ..arrays import Array
 from ..errors import InputError
 from ..toml_reader import read_toml
 from .assets import asset_file, asset_names
 
-Array = NDArray[np.float64]
 RadiusLaw = Callable[[Array, float, float], Array]
 
 _FINEST = 64

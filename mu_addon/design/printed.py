@@ -9,13 +9,12 @@ from __future__ import annotations
 
 import attrs
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
+from ..arrays import Array
 from .dimensions import Dimensions
 from .profile import outer_radius, outer_slope
 from .shapes import offset_along, ring
-
-Array = NDArray[np.float64]
 
 
 def as_printed(d: Dimensions, offset_xy: float, offset_z: float) -> Dimensions:

@@ -9,12 +9,11 @@ may differ from chamber to chamber (`wall_factors`).
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
+from ..arrays import Array
 from .dimensions import Dimensions
 from .shapes import offset_along
-
-Array = NDArray[np.float64]
 
 OFFSET_TOLERANCE = 5e-4
 """Largest distance in mm between the cubic arcs of the cavity and the exact offset curve."""

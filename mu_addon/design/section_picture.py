@@ -2,15 +2,12 @@
 
 from __future__ import annotations
 
-from typing import Any
-
 import numpy as np
 
+from ..arrays import Array
 from .lattice import Lattice, lattice_of
 from .parameters import Unit
 from .profile import cavity_polygon, outer_polygon
-
-Array = np.ndarray[Any, Any]
 
 # Red, green, blue and opacity. All are opaque: Blender's asset browser adds the colour of a translucent pixel
 # whole to what is behind it, which made the envelope as light as its struts.

@@ -21,6 +21,7 @@ import attrs
 import numpy as np
 from numpy.typing import NDArray
 
+from ..arrays import Array
 from ..errors import InputError
 from .anchors import SHORTEST, Window, anchor_points, window
 from .body import Body, covering, inside
@@ -32,8 +33,6 @@ from .quantity import describe
 from .settings import QUALITY
 from .solid import Solid, build_solid
 from .waveguide import Bar, waveguide
-
-Array = NDArray[np.float64]
 
 ALONG = 4
 """Number of flat pieces along a quarter of a chamber in the polygons of `profile` and `chambers`."""

@@ -10,6 +10,7 @@ import attrs
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from ..arrays import Array
 from ..errors import InputError
 from . import shapes
 from .gates import GateError, of_surface, require
@@ -20,7 +21,6 @@ from .surface import Triangles, Vertices, bad_edges, genus, stl_bytes, stl_surfa
 if TYPE_CHECKING:
     from .parameters import Unit
 
-Array = NDArray[np.float64]
 
 _GRID = 2**18
 # Half a cell is a whole number of steps of its vertices' grid: its flat sides are exactly on the planes, and

@@ -16,10 +16,9 @@ import attrs
 import numpy as np
 from numpy.typing import NDArray
 
+from ..arrays import Array
 from ..errors import InputError
 from .surface import Triangles, Vertices
-
-Array = NDArray[np.float64]
 
 CORE = "http://schemas.microsoft.com/3dmanufacturing/core/2015/02"
 BEAMS = "http://schemas.microsoft.com/3dmanufacturing/beamlattice/2017/02"

@@ -9,11 +9,9 @@ from __future__ import annotations
 from collections.abc import Iterable
 
 import numpy as np
-from numpy.typing import NDArray
 
+from ..arrays import Array
 from .factor_list import FactorList
-
-Array = NDArray[np.float64]
 
 WALLS = FactorList("chambers", "wall_factors", ("number",), "a chamber and a factor", "2")
 """Chambers count from 1 at the inlet."""

@@ -17,6 +17,7 @@ import attrs
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from ..arrays import Array
 from ..errors import InputError
 from .anchors import Window, anchor_points
 from .block import Block, face_moves
@@ -25,7 +26,6 @@ from .lattice import Lattice, lattice_of
 from .parameters import Unit
 from .profile import outer_radius
 
-Array = NDArray[np.float64]
 Integers = NDArray[np.int64]
 
 SHARPEST_DEG = 100.0

@@ -14,6 +14,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 import attrs
 import numpy as np
 
+from ..arrays import Array
 from ..errors import InputError
 from .law_at_points import evaluate
 from .laws import NeoHooke
@@ -22,7 +23,6 @@ if TYPE_CHECKING:
     from .beams import Sections
     from .materials import Layer
 
-Array = np.ndarray[Any, Any]
 
 # Stretches of fibres that energies are tabulated at, on either side of 1; beyond, they go on as parabolas.
 _SHORTER, _LONGER = np.linspace(0.5, 1.0, 26), np.linspace(1.0, 1.7, 36)

@@ -10,17 +10,17 @@ Unknowns of an element, (12,): displacement and rotation vector of its first nod
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import attrs
 import numpy as np
 
+from ..arrays import Array
 from .rotations import skew
 
 if TYPE_CHECKING:
     from .beam_fibres import Fibres
 
-Array = np.ndarray[Any, Any]
 
 LEAST_STRETCH = 0.2
 """Below this stretch an element's axial energy continues as a parabola, so that it keeps some length."""

@@ -2,14 +2,11 @@
 
 from __future__ import annotations
 
-from typing import Any
-
 import attrs
 import numpy as np
 
+from ..arrays import Array
 from ..meshing.mesh import AXES, TET_EDGES, Mesh, boundary_faces
-
-Array = np.ndarray[Any, Any]
 
 
 @attrs.frozen(eq=False)

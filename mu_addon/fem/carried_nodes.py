@@ -2,19 +2,18 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import attrs
 import numpy as np
 from scipy import sparse
 
+from ..arrays import Array
 from .beams import turned_curvature, turned_slopes
 from .rotations import rotation
 
 if TYPE_CHECKING:
     from ..meshing.mesh import Mesh
-
-Array = np.ndarray[Any, Any]
 
 
 def following(mesh: Mesh, u: Array) -> Array:

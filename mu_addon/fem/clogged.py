@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 import warp as wp
 
+from ..arrays import Array
 from ..errors import InputError
 from ..meshing.mesh import AXES, TRIANGLE_EDGES
 from .model import MaterialData, Model
@@ -14,7 +15,6 @@ from .model import MaterialData, Model
 if TYPE_CHECKING:
     from ..meshing.mesh import Mesh
 
-Array = np.ndarray[Any, Any]
 
 # Gauss-Legendre points on 0..1, exact for the cone's integrand of degree 5.
 _AT, _WEIGHT = np.polynomial.legendre.leggauss(3)

@@ -9,11 +9,10 @@ import numpy as np
 import warp as wp
 from scipy import sparse
 
+from ..arrays import Array
 from ..errors import ConvergenceError
 from . import krylov_kernels as kernels
 from .factor import IndefiniteError
-
-Array = np.ndarray[Any, Any]
 
 # Systems that one thread carries through the matrix together.
 WIDTHS = (1, 4, 16)

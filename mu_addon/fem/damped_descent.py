@@ -6,14 +6,13 @@ from typing import Any, Protocol
 
 import numpy as np
 
+from ..arrays import Array
 from ..errors import ConvergenceError
 from .factor import IndefiniteError
 from .line_search import LONGEST_STEP
 from .model import MaterialData, Model
 from .newton_settings import NewtonSettings
 from .state import State
-
-Array = np.ndarray[Any, Any]
 
 MOST_STEPS = 300
 # Residual below which directions come from the exact tangent of self-contact. Further away its negative

@@ -2,14 +2,11 @@
 
 from __future__ import annotations
 
-from typing import Any
-
 import numpy as np
 
+from ..arrays import Array
 from ..meshing.mesh import Mesh
 from .elements import shape_functions, solid_volumes, tet_quadrature, triangle_shapes
-
-Array = np.ndarray[Any, Any]
 
 STANDARD_GRAVITY = 9806.65  # mm/s2
 

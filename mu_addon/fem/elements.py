@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 from functools import cached_property
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import attrs
 import numpy as np
 
+from ..arrays import Array
 from ..errors import MeshingError
 from ..meshing.mesh import TET_EDGES, TRIANGLE_EDGES
 from ..meshing.quality import shapes
@@ -16,8 +17,6 @@ if TYPE_CHECKING:
     import warp as wp
 
     from ..meshing.mesh import Mesh
-
-Array = np.ndarray[Any, Any]
 
 
 def tet_quadrature(order: int) -> tuple[Array, Array]:

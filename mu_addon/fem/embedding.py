@@ -2,16 +2,13 @@
 
 from __future__ import annotations
 
-from typing import Any
-
 import attrs
 import numpy as np
 
+from ..arrays import Array
 from ..meshing.mesh import TET_EDGES, Mesh, boundary_faces
 from ..meshing.quality import shapes
 from .elements import shape_functions, shape_gradients
-
-Array = np.ndarray[Any, Any]
 
 # A curved element may hold points that its corners do not, beyond them by a share of its size: most are
 # found with the first, the rest, where a thin element follows a bend, with the second.

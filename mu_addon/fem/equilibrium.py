@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any
 import attrs
 import numpy as np
 
+from ..arrays import Array
 from ..design.quantity import in_kPa
 from ..errors import ConvergenceError
 from .damped_descent import EXACT_BELOW, damped_minimum
@@ -23,7 +24,6 @@ from .state import State, extrapolate, rest
 if TYPE_CHECKING:
     from .self_contact import SelfContact
 
-Array = np.ndarray[Any, Any]
 
 LOWER = "lower the pressure, thicken the wall or stiffen the material"
 """Remedy where a body has no equilibrium at a pressure."""

@@ -9,9 +9,8 @@ from typing import Any
 import numpy as np
 from scipy import sparse
 
+from ..arrays import Array
 from .triangular import Lower
-
-Array = np.ndarray[Any, Any]
 
 
 class IndefiniteError(ArithmeticError):

@@ -2,12 +2,10 @@
 
 from __future__ import annotations
 
-from typing import Any
-
 import attrs
 import numpy as np
 
-Array = np.ndarray[Any, Any]
+from ..arrays import Array
 
 # Of a step's share in contact: an energy is divided by it.
 _LEAST = 1e-6

@@ -2,15 +2,12 @@
 
 from __future__ import annotations
 
-from typing import Any
-
 import numpy as np
 
+from ..arrays import Array
 from ..errors import InputError
 from ..meshing.mesh import Mesh
 from .obstacle import Obstacle
-
-Array = np.ndarray[Any, Any]
 
 # N/mm: a unit at 1.0x moves its tip by some 10 mm for the load cell's reading, so that the cell's own
 # deflection, force over this, is some hundredths of a per cent of it.

@@ -2,17 +2,13 @@
 
 from __future__ import annotations
 
-from typing import Any
-
 import numpy as np
 
+from ..arrays import Array
 from ..errors import InputError
 from ..meshing.mesh import Mesh
 from .elements import reference_gradients, triangle_shapes
 from .embedding import Probe, embed
-
-Array = np.ndarray[Any, Any]
-
 
 MIRROR = np.array([-1.0, 1.0, 1.0])
 """Factors on a vector mirrored in the plane x = 0."""

@@ -8,14 +8,13 @@ from typing import TYPE_CHECKING, Any
 import attrs
 import numpy as np
 
+from ..arrays import Array
 from ..errors import InputError
 from .elements import ReferenceGradients, reference_gradients
 from .materials import Layer
 
 if TYPE_CHECKING:
     from ..meshing.mesh import Mesh
-
-Array = np.ndarray[Any, Any]
 
 
 @attrs.frozen(eq=False)

@@ -8,10 +8,9 @@ from typing import Any, NamedTuple
 import numpy as np
 import warp as wp
 
+from ..arrays import Array
 from . import kernels  # noqa: F401 (sets Warp up)
 from .laws.tensors import f64, mat33, mat99
-
-Array = np.ndarray[Any, Any]
 
 
 class Point(NamedTuple):

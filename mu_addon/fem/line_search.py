@@ -3,15 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from typing import Any
 
 import numpy as np
 
+from ..arrays import Array
 from ..errors import ConvergenceError
 from .model import MaterialData, Model
 from .newton_settings import NewtonSettings
-
-Array = np.ndarray[Any, Any]
 
 LONGEST_STEP = 0.025
 """Largest move of a node in a step, as a share of the body's longest side, where steps are limited."""

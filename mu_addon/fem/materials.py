@@ -8,10 +8,9 @@ from typing import Any
 import attrs
 import numpy as np
 
+from ..arrays import Array
 from ..errors import InputError
 from .laws import NeoHooke
-
-Array = np.ndarray[Any, Any]
 
 
 def _integers(values: Any) -> Array:

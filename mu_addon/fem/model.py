@@ -13,6 +13,7 @@ import numpy as np
 import warp as wp
 from scipy import sparse
 
+from ..arrays import Array
 from ..errors import InputError
 from ..meshing.mesh import AXES
 from . import follower_pressure, kernels
@@ -33,7 +34,6 @@ if TYPE_CHECKING:
     from .obstacle import Obstacle
     from .self_contact import SelfContact
 
-Array = np.ndarray[Any, Any]
 
 LEAST_STRAIN = 1e-5
 # With mean dilatation, a bulk modulus up to this many shear moduli still acts point by point. Without it, a

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import copy
-from typing import Any
 
 import numpy as np
 
@@ -13,8 +12,6 @@ from .carried_nodes import Carried
 from .elements import Reference
 from .model import Model
 from .self_contact import SelfContact
-
-Array = np.ndarray[Any, Any]
 
 
 def relocated(model: Model, mesh: Mesh, self_contact: SelfContact | None = None) -> Model:

@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from typing import Any
 
 import attrs
 import numpy as np
 
+from ..arrays import Array
 from ..errors import InputError
 from ..meshing.mesh import TRIANGLE_EDGES, Mesh
 from ..meshing.quality import shapes
@@ -16,8 +16,6 @@ from .elements import triangle_quadrature
 from .friction import Lag, Memory
 from .outer_faces import OuterFaces, outer_faces
 from .rigid import Pose, Rigid
-
-Array = np.ndarray[Any, Any]
 
 # A point slides where its friction is at least this share of its bound, which lags by less than the rest.
 _AT_BOUND = 0.999

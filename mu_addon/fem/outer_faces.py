@@ -2,15 +2,12 @@
 
 from __future__ import annotations
 
-from typing import Any
-
 import attrs
 import numpy as np
 
+from ..arrays import Array
 from ..meshing.mesh import AXES, Mesh, boundary_faces
 from .self_intersection import with_middles
-
-Array = np.ndarray[Any, Any]
 
 # Parts filled by less are cut away: a resolved mesh keeps this much of them, so that no motion is without
 # stiffness.

@@ -14,7 +14,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-Array = np.ndarray[Any, Any]
+from ..arrays import Array
 
 
 def reweigh(ipctk: Any, surface: Any, near: Any, candidates: Any, places: Array, reach_mm: float) -> None:

@@ -5,17 +5,15 @@ from __future__ import annotations
 import csv
 from collections.abc import Sequence
 from pathlib import Path
-from typing import Any
 
 import attrs
 import numpy as np
 
+from ..arrays import Array
 from ..errors import InputError
 from ..measured.kinds import CONVERTED
 from ..reading import require_rows, text_in
 from ..table_cells.own_tables import own_lines, own_rows, own_text
-
-Array = np.ndarray[Any, Any]
 
 COLUMNS = ("time_s", "pressure_kPa")
 LEAST_KPA, MOST_KPA = -101.325, 1000.0

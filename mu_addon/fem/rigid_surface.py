@@ -8,10 +8,9 @@ from typing import Any
 import numpy as np
 import warp as wp
 
+from ..arrays import Array
 from ..design.body import Body, body_of, flaws, require_sound
 from .rigid import round_bend
-
-Array = np.ndarray[Any, Any]
 
 # Regions of a triangle: its face, edges ab, bc, ca, and corners a, b, c.
 _FACE, _EDGE, _CORNER = 0, 1, 4

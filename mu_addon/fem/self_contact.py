@@ -12,6 +12,7 @@ import numpy as np
 from scipy import sparse
 from scipy.sparse.csgraph import connected_components, dijkstra
 
+from ..arrays import Array
 from ..design.quantity import in_kPa
 from ..errors import InputError
 from ..meshing.mesh import AXES, LATTICE, Mesh
@@ -19,8 +20,6 @@ from .outer_faces import free_boundary
 from .parallel_edges import reweigh
 from .self_friction import SelfFriction
 from .self_intersection import facets_of
-
-Array = np.ndarray[Any, Any]
 
 # Distances in gaps: around a strut's foot where it does not touch the wall; and of pairs that the tangent's
 # pattern makes room for, so that it grows seldom.

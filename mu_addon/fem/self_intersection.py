@@ -4,15 +4,13 @@ from __future__ import annotations
 
 import itertools
 from collections.abc import Sequence
-from typing import Any
 
 import attrs
 import numpy as np
 
+from ..arrays import Array
 from ..meshing.mesh import LATTICE, TET_EDGES, Mesh, boundary_faces, mirror, mirror_displacement
 from .state import State
-
-Array = np.ndarray[Any, Any]
 
 # A segment in a triangle's plane, to rounding: this share of a box of their edges.
 _FLAT = 1e-9

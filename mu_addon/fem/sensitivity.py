@@ -18,13 +18,12 @@ import attrs
 import numpy as np
 import warp as wp
 
+from ..arrays import Array
 from .laws.tensors import mat33
 
 if TYPE_CHECKING:
     from ..meshing.mesh import Mesh
     from .model import LayerData, MaterialData, Model
-
-Array = np.ndarray[Any, Any]
 
 
 @attrs.frozen(eq=False)

@@ -3,15 +3,13 @@
 from __future__ import annotations
 
 from functools import cached_property
-from typing import Any
 
 import attrs
 import numpy as np
 from scipy import sparse
 
+from ..arrays import Array
 from .factor import nested_dissection
-
-Array = np.ndarray[Any, Any]
 
 
 @attrs.define(eq=False, slots=False)

@@ -3,16 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from typing import Any
 
 import attrs
 import numpy as np
 
+from ..arrays import Array
 from ..design.quantity import in_kPa
 from ..errors import ConvergenceError
 from ..meshing.mesh import Mesh
-
-Array = np.ndarray[Any, Any]
 
 
 @attrs.frozen(eq=False)

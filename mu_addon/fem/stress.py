@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 from weakref import WeakKeyDictionary
 
 import attrs
 import numpy as np
 
+from ..arrays import Array
 from ..errors import InputError
 from ..meshing.mesh import TET_EDGES
 from .elements import ReferenceGradients, reference_gradients, shape_functions, tet_quadrature
@@ -20,7 +21,6 @@ if TYPE_CHECKING:
     from ..meshing.mesh import Mesh
     from .materials import Materials
 
-Array = np.ndarray[Any, Any]
 
 _CUT_AWAY = 1e-6
 # Poisson's ratio of struts where their resin is not known.

@@ -4,18 +4,17 @@ from __future__ import annotations
 
 import copy
 from functools import cached_property, partial
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 import warp as wp
 from scipy import sparse
 
+from ..arrays import Array
 from ..errors import InputError
 
 if TYPE_CHECKING:
     from ..meshing.mesh import Mesh
-
-Array = np.ndarray[Any, Any]
 
 
 NEGLIGIBLE = 1e-12

@@ -3,19 +3,17 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from typing import Any
 
 import attrs
 import numpy as np
 
+from ..arrays import Array
 from ..design.quantity import in_kPa, in_MPa
 from ..errors import ConvergenceError, InputError
 from .equilibrium import Equilibrium
 from .factor import IndefiniteError
 from .state import State, rest
 from .trajectory import Trajectory
-
-Array = np.ndarray[Any, Any]
 
 # A state may lie this many predicted moves from its prediction: sliding and softening set in at once and
 # change the stiffness by far more than elasticity does over a step.

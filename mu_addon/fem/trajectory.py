@@ -4,11 +4,11 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from functools import partial
-from typing import Any
 
 import attrs
 import numpy as np
 
+from ..arrays import Array
 from ..design.quantity import in_MPa
 from ..errors import InputError
 from ..meshing.mesh import Mesh, mirror, mirror_displacement
@@ -16,8 +16,6 @@ from .bending_angle import TipSection
 from .equilibrium import Equilibrium
 from .kinematics import cavity_volume_mm3
 from .state import State, rest
-
-Array = np.ndarray[Any, Any]
 
 
 @attrs.frozen(eq=False)

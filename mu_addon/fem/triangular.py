@@ -7,9 +7,8 @@ import attrs
 import numpy as np
 import warp as wp
 
+from ..arrays import Array
 from .substitution import COLUMNS, substitution_kernels
-
-Array = np.ndarray[Any, Any]
 
 # Right-hand sides that one thread carries through the factor together: the factor is read from memory
 # once for all of them.

@@ -3,10 +3,11 @@
 from __future__ import annotations
 
 import math
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 
+from ..arrays import Array
 from ..design.printed import skin_stiffening
 from ..design.quantity import in_MPa
 from ..design.strut_cell import StrutCell, depth_below_surface
@@ -21,7 +22,6 @@ if TYPE_CHECKING:
     from ..meshing.mesh import Mesh
     from .self_contact import SelfContact
 
-Array = np.ndarray[Any, Any]
 
 # An element of a strut is divided this often along each edge to tell how much of it is skin.
 _SKIN_STEPS = 4

@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from ..arrays import Array
 from ..design.quantity import in_MPa
 from .laws import LAWS, Friction, Layered, NeoHooke
 from .materials import Layer
@@ -13,7 +14,6 @@ from .materials import Layer
 if TYPE_CHECKING:
     from ..design.wall_material import Wall
 
-Array = np.ndarray[Any, Any]
 
 # Across the axis, along which a unit is printed.
 LAYER_NORMAL = (0.0, 0.0, 1.0)

@@ -8,11 +8,11 @@ them are neglected. The gripper hangs, tips down: gravity pulls along +z.
 from __future__ import annotations
 
 from collections.abc import Callable
-from typing import Any
 
 import attrs
 import numpy as np
 
+from ..arrays import Array
 from ..design.anchors import anchor_points
 from ..design.gripper import Gripper
 from ..errors import ConvergenceError, InputError
@@ -31,8 +31,6 @@ from ..fem.time_stepping import simulate_in_time
 from ..meshing.mesh import Mesh
 from .phases import WORDS, Phases
 from .settings import STEP_S, Contact, Cube
-
-Array = np.ndarray[Any, Any]
 
 # Halves of fingers that touch one cube.
 HALVES = 4

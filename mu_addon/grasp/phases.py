@@ -4,16 +4,14 @@ from __future__ import annotations
 
 from itertools import pairwise
 from pathlib import Path
-from typing import Any
 
 import attrs
 import numpy as np
 
+from ..arrays import Array
 from ..design.assets import asset_root
 from ..errors import InputError
 from ..fem.protocol import COLUMNS, Protocol, read_protocol, read_protocol_text
-
-Array = np.ndarray[Any, Any]
 
 SHIPPED = "protocols/gripper.csv"
 NAMES = ("i", "ii", "iii", "iv", "v")

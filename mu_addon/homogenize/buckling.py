@@ -8,18 +8,16 @@ eighth excludes.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import Any
 
 import attrs
 import numpy as np
 
+from ..arrays import Array
 from ..fem.factor import IndefiniteError
 from ..fem.model import Model
 from ..meshing.mesh import AXES
 from .octant import part
 from .specimen import Specimen
-
-Array = np.ndarray[Any, Any]
 
 # By mirror across x, y and z: whether it turns the motion into its negative.
 Signs = tuple[bool, bool, bool]

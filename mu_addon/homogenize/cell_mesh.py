@@ -7,12 +7,13 @@ from pathlib import Path
 import attrs
 import numpy as np
 
+from ..arrays import Array
 from ..design.strut_cell import Facets, StrutCell, depth_below_surface, octant_surface
 from ..errors import InputError, MeshingError
 from ..fem.elements import even_points, shape_functions
 from ..fem.laws import NeoHooke
 from ..fem.materials import Materials
-from ..meshing.mesh import Array, Mesh
+from ..meshing.mesh import Mesh
 from ..meshing.surface import mesh_surface
 from .octant import pieces
 

@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import Any, Literal
+from typing import Literal
 
 import attrs
 import numpy as np
 
+from ..arrays import Array
 from ..errors import ConvergenceError, InputError
 from ..fem.equilibrium import Equilibrium
 from ..fem.factor import IndefiniteError
@@ -17,7 +18,6 @@ from .specimen import Specimen
 from .stress_strain_curve import Curve
 from .strut_contact import StrutContact, first_strut_contact
 
-Array = np.ndarray[Any, Any]
 Friction = Literal["slide", "stick"]
 
 # Small first steps for the initial slope, then even ones up to the 40 % of the paper's tests.

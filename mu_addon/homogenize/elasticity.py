@@ -9,9 +9,10 @@ import attrs
 import numpy as np
 from numpy.typing import ArrayLike
 
+from ..arrays import Array
 from ..errors import MeshingError
 from ..fem.materials import Materials
-from ..meshing.mesh import Array, Mesh
+from ..meshing.mesh import Mesh
 from .bounds import hashin_shtrikman
 from .octant import SHEARS, Octant, require_factor
 

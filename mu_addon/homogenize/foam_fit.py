@@ -9,14 +9,13 @@ import attrs
 import numpy as np
 from scipy.optimize import least_squares
 
+from ..arrays import Array
 from ..design.quantity import in_kPa
 from ..errors import InputError
 from ..fem.lattice_law import LatticeLaw
 from ..fem.laws import CubicShear, DiagonalStretch, Foam
 from .foam_response import ellipticity, small_strain, uniaxial
 from .stress_strain_curve import Curve
-
-Array = np.ndarray[Any, Any]
 
 NAME = "foam + cubic shear + diagonal stretch"
 # A lateral misfit of this part of the largest lateral strain weighs as much as a misfit of stress of 0.3 of

@@ -2,14 +2,11 @@
 
 from __future__ import annotations
 
-from typing import Any
-
 import numpy as np
 
+from ..arrays import Array
 from ..fem.lattice_law import LatticeLaw
 from ..fem.law_at_points import evaluate
-
-Array = np.ndarray[Any, Any]
 
 _MOST_STEPS = 60
 # Of the lateral stretch's logarithm; below it rounding decides.

@@ -15,12 +15,13 @@ import attrs
 import numpy as np
 from scipy import sparse
 
+from ..arrays import Array
 from ..errors import InputError, MeshingError
 from ..fem.factor import Cholesky, IndefiniteError, SuperLU, make_factor
 from ..fem.materials import Materials
 from ..fem.model import Model
 from ..fem.sparsity import Pattern
-from ..meshing.mesh import AXES, Array, Mesh
+from ..meshing.mesh import AXES, Mesh
 from ..meshing.tiling import box_of
 
 # Voigt's order, and the axes each shear is of.

@@ -13,9 +13,8 @@ from typing import Any
 import attrs
 import numpy as np
 
+from ..arrays import Array
 from ..errors import InputError
-
-Array = np.ndarray[Any, Any]
 
 
 def _float64(values: Any) -> Array:

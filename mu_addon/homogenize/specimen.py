@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from typing import Any
-
 import attrs
 import numpy as np
 
@@ -11,8 +9,6 @@ from ..errors import InputError
 from ..fem.materials import Layer, Materials
 from ..meshing.mesh import AXES, FLIPPED_TET, Mesh
 from ..meshing.tiling import box_of, tiled
-
-Array = np.ndarray[Any, Any]
 
 
 @attrs.frozen(eq=False)

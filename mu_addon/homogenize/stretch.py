@@ -8,11 +8,12 @@ from collections.abc import Callable, Sequence
 import attrs
 import numpy as np
 
+from ..arrays import Array
 from ..errors import ConvergenceError, InputError
 from ..fem.factor import IndefiniteError
 from ..fem.materials import Materials
 from ..fem.self_intersection import crossings
-from ..meshing.mesh import AXES, Array, Mesh
+from ..meshing.mesh import AXES, Mesh
 from .octant import Octant, require_factor
 from .stress_strain_curve import Curve
 

@@ -3,16 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import Any
 
 import attrs
 import numpy as np
 
+from ..arrays import Array
 from ..fem.self_intersection import first_self_intersection
 from ..fem.state import State
 from ..meshing.mesh import AXES, Mesh
-
-Array = np.ndarray[Any, Any]
 
 # Nodes this share of a specimen's side beyond a plane are there by rounding.
 _ROUNDING = 1e-9

@@ -17,6 +17,7 @@ from typing import Any
 import attrs
 import numpy as np
 
+from ..arrays import Array
 from ..body.morph import PrintedMorph
 from ..body.printed_mesh import mesh_printed
 from ..design.dimensions import Dimensions
@@ -36,8 +37,6 @@ from ..report.motion_files import Surface, SurfaceFields, read_motion, surfaces_
 from ..studies.unit_ranking import UnitStudy as Study
 from . import known
 from .requests import ASKED, BENT, CELLS, LEVELS, REQUEST
-
-Array = np.ndarray[Any, Any]
 
 RUNGS = 4
 """Number of pressures solved between 0 and the largest."""

@@ -11,14 +11,13 @@ from typing import Any
 import attrs
 import numpy as np
 
+from ..arrays import Array
 from ..design.quantity import in_MPa
 from ..errors import ConvergenceError, InputError
 from ..fem.law_at_points import evaluate
 from ..fem.law_at_points import stress as point_stress
 from ..measured import Experiment
 from ..measured.kinds import MODES as MODES
-
-Array = np.ndarray[Any, Any]
 
 _FREE = {"uniaxial": (1, 2), "equibiaxial": (2,), "pure_shear": (2,)}
 # Lateral stress taken as zero, as a share of the shear and bulk modulus together.

@@ -7,9 +7,10 @@ from collections.abc import Sequence
 import attrs
 import numpy as np
 
+from ..arrays import Array
 from ..design.parameters import HIGHEST_POISSON
 from ..errors import InputError
-from .coupon import Array, Coupon, binned, incompressible
+from .coupon import Coupon, binned, incompressible
 from .intervals import Parameter, intervals
 from .law_forms import Form
 from .regression import Problem, best_exponents

@@ -9,7 +9,7 @@ import numpy as np
 from scipy import optimize
 from scipy.special import stdtrit
 
-from .coupon import Array
+from ..arrays import Array
 from .law_forms import EXPONENTS, Form
 from .regression import Problem, linear, nonzero_exponents
 

@@ -7,8 +7,9 @@ from collections.abc import Mapping, Sequence
 import attrs
 import numpy as np
 
+from ..arrays import Array
 from ..errors import InputError
-from .coupon import Array, Coupon
+from .coupon import Coupon
 from .fit import Fit, ranges
 from .stability import whole_ranges
 

@@ -7,10 +7,11 @@ from typing import Any
 import attrs
 import numpy as np
 
+from ..arrays import Array
 from ..design.declared_laws import form_names
 from ..errors import InputError
 from ..fem.laws import LAWS
-from .coupon import Array, isochoric_stress
+from .coupon import isochoric_stress
 
 # Exponents of Ogden terms are looked for between these.
 EXPONENTS = (-15.0, 25.0)

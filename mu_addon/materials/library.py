@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Any
 import attrs
 import numpy as np
 
+from ..arrays import Array
 from ..design.assets import asset_file, asset_names
 from ..design.declared_laws import wall_laws, wall_parameters
 from ..design.parameters import HIGHEST_POISSON
@@ -20,7 +21,7 @@ from ..fem import laws
 from ..reading import text_in
 from ..toml_reader import TomlTable, parsed_toml
 from ..toml_writer import toml_value
-from .coupon import MODES, Array
+from .coupon import MODES
 from .law_forms import with_bulk
 from .stability import Stability, check_stability, whole_ranges
 

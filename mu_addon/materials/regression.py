@@ -9,7 +9,8 @@ import attrs
 import numpy as np
 from scipy import optimize
 
-from .coupon import Array, Coupon, isochoric_stress, isochoric_stretches
+from ..arrays import Array
+from .coupon import Coupon, isochoric_stress, isochoric_stretches
 from .law_forms import EXPONENTS, Form
 
 # Exponents of which every combination is tried, and how many of the best are refined.

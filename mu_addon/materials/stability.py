@@ -8,9 +8,10 @@ from typing import Any
 import attrs
 import numpy as np
 
+from ..arrays import Array
 from ..errors import InputError
 from ..fem.law_at_points import evaluate
-from .coupon import MODES, Array, equivalent_stretch, principal_stretches, stretch_of_equivalent
+from .coupon import MODES, equivalent_stretch, principal_stretches, stretch_of_equivalent
 
 POINTS = 101
 _PAIRS = ((0, 1), (1, 2), (2, 0))

@@ -8,9 +8,8 @@ from typing import Any
 import attrs
 import numpy as np
 
+from ..arrays import Array
 from ..errors import MeshingError
-
-Array = np.ndarray[Any, Any]
 
 MEMBRANE, LATTICE = 1, 2
 AXES = ("x", "y", "z")

@@ -5,10 +5,11 @@ from __future__ import annotations
 import attrs
 import numpy as np
 
+from ..arrays import Array
 from ..design.parameters import Unit
 from ..design.profile import cavity_volume, membrane_volume
 from ..errors import MeshingError
-from .mesh import LATTICE, MEMBRANE, TET_EDGES, TRIANGLE_EDGES, Array, Mesh
+from .mesh import LATTICE, MEMBRANE, TET_EDGES, TRIANGLE_EDGES, Mesh
 
 # Barycentric points and weights (summing to 1) of degree 3, which integrates a curved volume exactly,
 # det J being cubic. Source: Keast, Comput. Methods Appl. Mech. Eng. 55 (1986) 339.

@@ -17,6 +17,7 @@ from typing import Any
 
 import numpy as np
 
+from ..arrays import Array
 from ..design.block import FACES
 from ..design.dimensions import Dimensions
 from ..design.profile import cavity_arcs, cavity_volume, outer_arcs, outer_volume
@@ -25,8 +26,6 @@ from ..errors import InputError, MeshingError
 from ..files import output_error, replacing
 from ..reading import file_bytes
 from .gmsh_model import gmsh_model, load_gmsh
-
-Array = np.ndarray[Any, Any]
 
 ROUND = 16
 """Elements around a full turn, of order 2, when a STEP file is measured: volumes are then right to 2e-4."""

@@ -14,9 +14,10 @@ from typing import Any
 import attrs
 import numpy as np
 
+from ..arrays import Array
 from ..errors import InputError, MeshingError
 from ..files import read_npz, write_npz
-from .mesh import LATTICE, Array, Mesh, boundary_faces, edges_of, oriented, second_order
+from .mesh import LATTICE, Mesh, boundary_faces, edges_of, oriented, second_order
 from .quality import check_positive
 
 VOID = 0

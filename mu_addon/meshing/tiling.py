@@ -6,8 +6,9 @@ from collections.abc import Sequence
 
 import numpy as np
 
+from ..arrays import Array
 from ..errors import MeshingError
-from .mesh import FLIPPED_TET, Array, Mesh
+from .mesh import FLIPPED_TET, Mesh
 
 
 def box_of(mesh: Mesh) -> tuple[float, float, float]:

@@ -12,10 +12,11 @@ from itertools import pairwise
 import attrs
 import numpy as np
 
+from ..arrays import Array
 from ..design.dimensions import Dimensions
 from ..design.profile import foot, outer_radius, outer_slope, under_profile
 from ..errors import InputError, MeshingError
-from .mesh import Array, boundary_faces, edges_of, oriented
+from .mesh import boundary_faces, edges_of, oriented
 
 # A cube split in five, in the two mirror images that alternate so that diagonals of neighbours meet;
 # a corner is numbered 4 i + 2 j + k.

@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import Any
 
 import attrs
 import numpy as np
 
+from ..arrays import Array
 from ..design.parameters import Unit
 from ..errors import ConvergenceError, InputError, MeshingError
 from ..fem.factor import IndefiniteError
@@ -17,8 +17,6 @@ from .structure import WITHOUT, solve
 from .targets import Target
 from .uncertainty import Uncertainty
 from .unit_body import Mechanics, UnitBody
-
-Array = np.ndarray[Any, Any]
 
 
 @attrs.frozen(eq=False)

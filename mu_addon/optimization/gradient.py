@@ -22,13 +22,12 @@ from typing import Any
 import attrs
 import numpy as np
 
+from ..arrays import Array
 from ..design.quantity import in_MPa
 from ..errors import MeshingError
 from ..fem.model import Model
 from .residual_change import ResidualChange
 from .structure import WITHOUT, Condition, Quantity, States, Structure
-
-Array = np.ndarray[Any, Any]
 
 Pair = tuple[Structure, Structure, float]
 """The body with one freedom moved up, and down, and the difference of the freedom between the two."""

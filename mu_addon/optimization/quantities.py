@@ -7,6 +7,7 @@ from typing import Any
 import attrs
 import numpy as np
 
+from ..arrays import Array
 from ..errors import InputError
 from ..fem.bending_angle import TipSection, tip_faces
 from ..fem.held_tip import HeldTip
@@ -18,8 +19,6 @@ from ..fem.sensitivity import Sensitivity
 from ..meshing.mesh import AXES, LATTICE, MEMBRANE, Mesh
 from .residual_change import ResidualChange
 from .structure import WITHOUT, Condition, States, Structure
-
-Array = np.ndarray[Any, Any]
 
 REGIONS = {"wall": MEMBRANE, "struts": LATTICE}
 MOST_STRETCHED = 0.01

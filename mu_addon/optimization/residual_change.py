@@ -4,17 +4,15 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from functools import cached_property
-from typing import Any
 
 import numpy as np
 
+from ..arrays import Array
 from ..design.quantity import in_MPa
 from ..fem.materials import Materials
 from ..fem.model import Model
 from ..fem.sensitivity import Sensitivity, of_residual
 from .structure import Condition, Structure
-
-Array = np.ndarray[Any, Any]
 
 
 class ResidualChange:

@@ -8,12 +8,12 @@ from typing import Any
 import attrs
 import numpy as np
 
+from ..arrays import Array
 from .design_file import Design
 from .evaluation import Evaluated
 from .search import Found, Observed, Search, Values
 from .uncertainty import SURE
 
-Array = np.ndarray[Any, Any]
 Simulation = tuple[Values, float, bool]
 """Values of the freedoms, refinement of the mesh, and whether slopes are asked for."""
 Course = Generator[list[Simulation], Sequence[Evaluated], Found]

@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import Any
 
 import attrs
 import numpy as np
 
+from ..arrays import Array
 from ..design.body import Body, envelope
 from ..design.parameters import Unit
 from ..design.printing.check import check
@@ -18,8 +18,6 @@ from .evaluation import evaluate
 from .targets import Target
 from .uncertainty import SURE, Uncertainty
 from .unit_body import Mechanics
-
-Array = np.ndarray[Any, Any]
 
 
 @attrs.frozen(eq=False)

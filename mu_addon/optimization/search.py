@@ -16,13 +16,13 @@ from typing import Any
 import attrs
 import numpy as np
 
+from ..arrays import Array
 from ..generators import value_of
 from .freedoms import Freedom
 from .settings import BATCH, EVALUATIONS, SEED
 from .surrogate import Surrogate, fit_all
 from .targets import Target
 
-Array = np.ndarray[Any, Any]
 Values = tuple[float | int | str, ...]
 """A design: one value for each freedom."""
 

@@ -2,11 +2,10 @@
 
 from __future__ import annotations
 
-from typing import Any
-
 import attrs
 import numpy as np
 
+from ..arrays import Array
 from ..design.anchors import anchor_points, window
 from ..design.dimensions import Dimensions
 from ..design.parameters import Unit
@@ -20,8 +19,6 @@ from ..sensing.light_law import Law, fit_law
 from ..sensing.light_signal import response, signal_of_nodes
 from ..sensing.optics import Optics
 from .structure import WITHOUT, Condition, States, Structure
-
-Array = np.ndarray[Any, Any]
 
 STATIONS = 51
 STEP_MM = 1e-5

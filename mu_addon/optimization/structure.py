@@ -9,6 +9,7 @@ from typing import Any, NamedTuple, Protocol
 import attrs
 import numpy as np
 
+from ..arrays import Array
 from ..design.quantity import in_MPa
 from ..errors import InputError
 from ..fem.equilibrium import Equilibrium
@@ -17,8 +18,6 @@ from ..fem.materials import Materials
 from ..fem.model import Model
 from ..fem.newton_settings import NewtonSettings
 from ..fem.state import State, rest
-
-Array = np.ndarray[Any, Any]
 
 WALL_STEPS = 4
 """Number of steps in which a tip is moved to the wall that holds it."""

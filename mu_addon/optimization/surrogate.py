@@ -9,12 +9,11 @@ and sec. 9.4.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import Any
 
 import attrs
 import numpy as np
 
-Array = np.ndarray[Any, Any]
+from ..arrays import Array
 
 LENGTHS = (0.25, 0.5, 1.0, 2.0, 4.0)
 NOISE = 1e-4

@@ -2,15 +2,12 @@
 
 from __future__ import annotations
 
-from typing import Any
-
 import attrs
 import numpy as np
 
+from ..arrays import Array
 from ..design.parameters import Unit
 from .freedoms import Freedom
-
-Array = np.ndarray[Any, Any]
 
 SURE = 2.0
 """Number of standard errors either way within which a robust unit meets a target."""

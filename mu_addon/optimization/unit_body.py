@@ -11,6 +11,7 @@ from typing import Any
 import attrs
 import numpy as np
 
+from ..arrays import Array
 from ..body.candidates import states_along
 from ..body.morph import PrintedMorph
 from ..body.printed_mesh import mesh_printed
@@ -29,8 +30,6 @@ from ..meshing.settings import MeshSettings
 from .freedoms import Freedom, changed_unit
 from .gradient import Pair
 from .structure import Structure
-
-Array = np.ndarray[Any, Any]
 
 STEP = 1e-4
 """Half step of a freedom's central differences, relative to its value (or its range, where that is

@@ -7,12 +7,11 @@ from typing import Any
 
 import numpy as np
 
+from ..arrays import Array
 from .freedoms import Freedom
 from .robustness import Verified
 from .search import Found, Observed
 from .targets import Target
-
-Array = np.ndarray[Any, Any]
 
 
 def outcome(found: Found, targets: Sequence[Target]) -> str:

@@ -5,11 +5,9 @@ from __future__ import annotations
 from typing import Any
 
 import attrs
-import numpy as np
 
+from ..arrays import Array
 from .deviation import Deviation, centreline, centreline_deviation
-
-Array = np.ndarray[Any, Any]
 
 
 @attrs.frozen(eq=False)

@@ -7,7 +7,7 @@ from typing import Any
 import attrs
 import numpy as np
 
-Array = np.ndarray[Any, Any]
+from ..arrays import Array
 
 
 def centreline(points: Array, stations: int) -> Array:

@@ -5,18 +5,16 @@ from __future__ import annotations
 from collections.abc import Iterator
 from functools import cached_property
 from itertools import pairwise
-from typing import Any
 
 import attrs
 import numpy as np
 
+from ..arrays import Array
 from ..design.dimensions import Dimensions
 from ..design.lattice import lattice_of
 from ..design.profile import outer_radius
 from ..errors import InputError
 from .settings import BEND, LONGEST, SHORTEST
-
-Array = np.ndarray[Any, Any]
 
 # Points along a step at which its distance from the membrane is measured; heights of the profile's
 # points, as a share of the clearance: the distance is then overestimated by less than 0.2 %.

@@ -7,18 +7,16 @@ then a small dense system.
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from typing import Any
 
 import attrs
 import numpy as np
 
+from ..arrays import Array
 from ..fem.factor import Cholesky, SuperLU
 from ..fem.model import Model
 from ..fem.triangular import Triangular
 from .graph import Graph
 from .sampling import polynomials
-
-Array = np.ndarray[Any, Any]
 
 # Patterns solved at once, so that their solutions need not all be held.
 BLOCK = 128

@@ -8,10 +8,9 @@ from typing import Any
 import attrs
 import numpy as np
 
+from ..arrays import Array
 from ..errors import InputError
 from ..generators import value_of
-
-Array = np.ndarray[Any, Any]
 
 
 @attrs.frozen

@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import Any
 
 import attrs
 import numpy as np
 
+from ..arrays import Array
 from ..errors import MeshingError
 from ..fem.embedding import Probe
 from ..fem.factor import IndefiniteError
@@ -18,8 +18,6 @@ from ..fem.trajectory import Trajectory
 from ..meshing.mesh import Mesh
 from .deviation import centreline
 from .sampling import polynomials
-
-Array = np.ndarray[Any, Any]
 
 # Step in mm for the centreline's derivative by its points; the spline is smooth, so that the error is
 # of the order of its square.

@@ -22,12 +22,11 @@ from scipy.interpolate import BSpline
 from scipy.optimize import minimize_scalar, nnls
 from scipy.special import stdtrit
 
+from ..arrays import Array
 from ..errors import InputError
 from ..files import write_text
 from ..toml_reader import TomlTable, read_toml
 from ..toml_writer import Commented, toml_text
-
-Array = np.ndarray[Any, Any]
 
 VERSION = 1
 _DEGREE = 3

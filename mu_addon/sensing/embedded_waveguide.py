@@ -9,18 +9,16 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from itertools import pairwise
-from typing import Any
 
 import attrs
 import numpy as np
 
+from ..arrays import Array
 from ..design.dimensions import Dimensions
 from ..design.waveguide import Bar
 from ..fem.kinematics import MIRROR, mean_gradients, numbers_of
 from ..meshing.mesh import Mesh
 from .guide import Centreline
-
-Array = np.ndarray[Any, Any]
 
 _STEPS_A_MM = 4
 _STRAIGHT = 1e-6

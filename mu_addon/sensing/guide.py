@@ -4,14 +4,12 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from itertools import pairwise
-from typing import Any
 
 import attrs
 import numpy as np
 
+from ..arrays import Array
 from ..errors import InputError
-
-Array = np.ndarray[Any, Any]
 
 WALL, ENTRY, EXIT, JUNCTION = 0, 1, 2, 3
 

@@ -12,11 +12,11 @@ The logarithm of the light's loss is linear in
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from typing import Any
 
 import attrs
 import numpy as np
 
+from ..arrays import Array
 from ..design.dimensions import Dimensions
 from ..design.waveguide import STRUT_GAP
 from ..errors import InputError
@@ -25,8 +25,6 @@ from .guide import Centreline, swept
 from .notched import well_angles, with_wells
 from .optics import Optics
 from .tracing import Light, lambertian, trace
-
-Array = np.ndarray[Any, Any]
 
 RAYS = 8000
 _STEPS_A_MM = 4

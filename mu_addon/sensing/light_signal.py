@@ -7,12 +7,12 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from itertools import combinations
-from typing import Any
 
 import attrs
 import numpy as np
 from numpy.typing import ArrayLike
 
+from ..arrays import Array
 from ..design.anchors import Window, anchor_points
 from ..design.parameters import Unit
 from ..design.waveguide import waveguide
@@ -21,8 +21,6 @@ from ..meshing.mesh import Mesh
 from .embedded_waveguide import EmbeddedWaveguide, Joints, embed_waveguide
 from .light_law import Law, features, fit_law, traced
 from .optics import Optics
-
-Array = np.ndarray[Any, Any]
 
 
 @attrs.frozen(eq=False)

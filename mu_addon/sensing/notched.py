@@ -8,14 +8,11 @@ and c is half its depth: a pulled bar opens its wells though its ends do not tur
 
 from __future__ import annotations
 
-from typing import Any
-
 import numpy as np
 
+from ..arrays import Array
 from .embedded_waveguide import WaveguideShape
 from .guide import Centreline
-
-Array = np.ndarray[Any, Any]
 
 _STEPS_A_MM = 8
 

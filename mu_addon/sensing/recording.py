@@ -28,13 +28,12 @@ from typing import IO, Any
 import attrs
 import numpy as np
 
+from ..arrays import Array
 from ..errors import InputError
 from ..files import append_lines, make_folder, output_error, plain
 from ..reading import file_bytes
 from .byte_accounts import Reject
 from .samples import Samples
-
-Array = np.ndarray[Any, Any]
 
 FIXED = ("time_s", "device_s", "sequence")
 INDEX = "index.ndjson"

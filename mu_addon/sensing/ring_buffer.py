@@ -7,15 +7,13 @@ import os
 import struct
 from contextlib import suppress
 from pathlib import Path
-from typing import Any
 
 import attrs
 import numpy as np
 
+from ..arrays import Array
 from ..errors import InputError
 from ..files import output_error
-
-Array = np.ndarray[Any, Any]
 
 _MAGIC = b"mu-ring1"
 # Magic, columns, capacity, rows written so far.

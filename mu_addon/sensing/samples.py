@@ -4,16 +4,14 @@ from __future__ import annotations
 
 import math
 from collections import deque
-from typing import Any
 
 import attrs
 import numpy as np
 
+from ..arrays import Array
 from .byte_accounts import Accounts, Reject
 from .clock import HostTime
 from .numbering import Numbered, Numbering, Row
-
-Array = np.ndarray[Any, Any]
 
 # Least step of the host's time from sample to sample: more than the last digit of a recording (1e-6 s), since
 # steps of exactly that, counted from any start, are written as one value now and then.

@@ -18,6 +18,7 @@ from typing import Any
 import attrs
 import numpy as np
 
+from ..arrays import Array
 from ..errors import OutputError
 from ..files import plain
 from .decoder import Decoder
@@ -27,7 +28,6 @@ from .ring_buffer import Ring
 from .samples import Samples
 from .sources import Source
 
-Array = np.ndarray[Any, Any]
 EventHandler = Callable[[str, dict[str, Any]], None]
 # Values (n, c) in the channels' units -> further columns (n, d), shown beside them and not recorded.
 Derive = Callable[[tuple[str, ...], Array], tuple[tuple[str, ...], Array]]

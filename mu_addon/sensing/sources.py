@@ -15,8 +15,6 @@ from .framing import info_frame, sample_frame
 from .recording import Recording, read_recording
 from .settings import BAUD
 
-Array = np.ndarray[Any, Any]
-
 _WAIT_S = 0.02
 
 

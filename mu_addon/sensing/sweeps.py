@@ -7,11 +7,11 @@ import math
 import os
 from collections.abc import Sequence
 from pathlib import Path
-from typing import Any
 
 import attrs
 import numpy as np
 
+from ..arrays import Array
 from ..errors import InputError
 from ..measured import read_folder
 from ..reading import require_rows
@@ -20,8 +20,6 @@ from ..table_cells.own_tables import own_lines, own_rows, own_text
 from .calibration import Calibration, CalibrationSweep, sweeps_of
 from .recording import INDEX, Recording, read_recording
 from .session import BACK, SWEEP
-
-Array = np.ndarray[Any, Any]
 
 # After the mark "angle 30" the sensor is held there for that long.
 _HOLD_S = 1.0

@@ -7,17 +7,14 @@ normal by a Gaussian slope. Light that leaves through JUNCTION faces is lost in 
 
 from __future__ import annotations
 
-from typing import Any
-
 import attrs
 import numpy as np
 import warp as wp
 
+from ..arrays import Array
 from .guide import Guide
 from .optics import Optics
 from .ray_kernel import ABSORBED, DETECTED, FATES, trace_rays
-
-Array = np.ndarray[Any, Any]
 
 
 @attrs.frozen

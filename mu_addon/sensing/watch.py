@@ -9,12 +9,11 @@ from typing import Any
 
 import numpy as np
 
+from ..arrays import Array
 from ..errors import InputError
 from ..reading import file_bytes
 from .ring_buffer import Ring
 from .session import STATUS
-
-Array = np.ndarray[Any, Any]
 
 
 class Watched:

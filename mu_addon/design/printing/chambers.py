@@ -6,10 +6,10 @@ import attrs
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from ...arrays import Array
 from .cell_runs import Parts, parts_of, runs_of
 from .voxels import VoxelRows
 
-Array = NDArray[np.float64]
 Index = NDArray[np.int64]
 
 DEEP = 6.0

@@ -8,8 +8,8 @@ from typing import Any
 
 import attrs
 import numpy as np
-from numpy.typing import NDArray
 
+from ...arrays import Array
 from ..anchors import Window
 from ..dimensions import Dimensions
 from ..lattice import graph_of
@@ -67,8 +67,6 @@ def _difference(more: int) -> str:
         return f": {-more} less, as if struts were missing or openings closed"
     return f": {more} more, as if there were a hole or a strut too many"
 
-
-Array = NDArray[np.float64]
 
 FACETS = 0.002
 """Share of a chamber's radius by which facets may make its wall thinner than drawn."""

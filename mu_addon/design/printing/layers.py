@@ -9,10 +9,9 @@ import attrs
 import numpy as np
 from numpy.typing import NDArray
 
+from ...arrays import Array
 from .cell_runs import Runs, joined, meeting
 from .voxels import VoxelRows
-
-Array = NDArray[np.float64]
 
 
 @attrs.frozen(eq=False)

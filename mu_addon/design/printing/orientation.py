@@ -9,13 +9,12 @@ import attrs
 import numpy as np
 from numpy.typing import NDArray
 
+from ...arrays import Array
 from ..surface import Triangles, Vertices
 from .layers import islands, regions
 from .thickness import Samples
 from .trapped_resin import cups
 from .voxels import frame_along, voxel_rows
-
-Array = NDArray[np.float64]
 
 
 @attrs.frozen

@@ -7,13 +7,12 @@ from typing import Any
 
 import attrs
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
+from ...arrays import Array
 from ...errors import InputError
 from ..surface import Triangles, Vertices
 from .voxels import frame_along
-
-Array = NDArray[np.float64]
 
 # Points of an outline nearer than this, in mm, to the line between their neighbours go.
 _SIMPLE_mm = 0.02

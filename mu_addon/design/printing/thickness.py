@@ -8,9 +8,8 @@ import attrs
 import numpy as np
 from numpy.typing import NDArray
 
+from ...arrays import Array
 from ..surface import Triangles, Vertices
-
-Array = NDArray[np.float64]
 
 START = 1e-3
 """Distance in mm from the surface at which a ray starts, so that it does not hit its own triangle."""

@@ -10,7 +10,8 @@ import attrs
 import numpy as np
 from numpy.typing import NDArray
 
-from .layers import Array, Regions
+from ...arrays import Array
+from .layers import Regions
 from .voxels import VoxelRows
 
 

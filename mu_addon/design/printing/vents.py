@@ -13,8 +13,8 @@ from typing import Any
 
 import attrs
 import numpy as np
-from numpy.typing import NDArray
 
+from ...arrays import Array
 from .. import shapes
 from ..gates import GateError
 from ..solid import printable
@@ -23,8 +23,6 @@ from .layers import regions
 from .printer import Printer
 from .trapped_resin import cups
 from .voxels import frame_along, voxel_rows
-
-Array = NDArray[np.float64]
 
 DIAMETER_MM = 2.0
 """Diameter of a vent: a ball of it passes, and viscous resin drains (assumed)."""
@@ -156,7 +154,7 @@ def _outside(solid: Any) -> Any:
 def _vent(solid: Any, outside: Any, start: Array, up: Array, ml: float) -> Vent:
     """The vent at the start of a cup, through the most suitable wall; raises GateError."""
     ways = np.array([w for w in itertools.product((-1.0, 0.0, 1.0), repeat=3) if any(w)]) @ frame_along(up)
-    ways /= np.linalg.norm(ways, axis=1, keepdims=True)
+    ways = ways / np.linalg.norm(ways, axis=1, keepdims=True)
     # Toward the platform first, then aside: a hole away from it would begin above the cup's first layer.
     ways = ways[np.argsort(ways @ up, kind="stable")]
     radius = 0.5 * DIAMETER_MM

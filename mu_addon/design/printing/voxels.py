@@ -9,10 +9,10 @@ import attrs
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from ...arrays import Array
 from ..surface import Triangles, Vertices
 from .cell_runs import Runs
 
-Array = NDArray[np.float64]
 Index = NDArray[np.int64]
 
 _AT_ONCE = 2_000_000

@@ -7,7 +7,8 @@ from typing import Any
 import numpy as np
 import warp as wp
 
-from .law import Array, Law
+from ...arrays import Array
+from .law import Law
 from .principal import of_stretches, power_difference
 from .tensors import f64, mat33, vec3
 from .valid import require, require_positive

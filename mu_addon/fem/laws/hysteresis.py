@@ -7,9 +7,10 @@ from typing import Any
 import numpy as np
 import warp as wp
 
+from ...arrays import Array
 from .green import green_strain, of_green_strain, symmetric_identity
 from .isochoric import split
-from .law import Array, Law
+from .law import Law
 from .tensors import THIRD, add_dyad, f64, isochoric, mat33, mat99, put_symmetric, symmetric_at
 
 # A uniaxial stress s has a deviator of length sqrt(2/3) s.

@@ -5,12 +5,9 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import Any
 
-import numpy as np
-
+from ...arrays import Array
 from ...design.declared_laws import wall_parameters
 from .valid import require_positive
-
-Array = np.ndarray[Any, Any]
 
 
 class Law:

@@ -7,8 +7,9 @@ from typing import Any
 import numpy as np
 import warp as wp
 
+from ...arrays import Array
 from .green import of_green_strain
-from .law import Array, Law
+from .law import Law
 from .tensors import f64, mat33, mat99, vec3
 from .valid import require_unit, unit
 

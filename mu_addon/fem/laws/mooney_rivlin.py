@@ -7,9 +7,10 @@ from typing import Any
 import numpy as np
 import warp as wp
 
+from ...arrays import Array
 from .invariants import of_invariants, slopes
 from .isochoric import split
-from .law import Array, Law
+from .law import Law
 from .tensors import f64
 from .valid import require, require_positive
 

@@ -7,7 +7,8 @@ from typing import Any
 import numpy as np
 import warp as wp
 
-from .law import Array, Law
+from ...arrays import Array
+from .law import Law
 from .tensors import THIRD, TWO_THIRDS, f64, mat33, mat99
 from .valid import shear_and_bulk
 

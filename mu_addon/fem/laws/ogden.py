@@ -7,8 +7,9 @@ from typing import Any
 import numpy as np
 import warp as wp
 
+from ...arrays import Array
 from .isochoric import split
-from .law import Array, Law
+from .law import Law
 from .principal import of_stretches, power_difference
 from .tensors import f64, mat33, vec3
 from .valid import require, require_positive

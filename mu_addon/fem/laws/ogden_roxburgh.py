@@ -8,9 +8,10 @@ from typing import Any
 import numpy as np
 import warp as wp
 
+from ...arrays import Array
 from ...design.quantity import in_MPa
 from .isochoric import split
-from .law import Array, Law
+from .law import Law
 from .tensors import add_dyad, f64, isochoric, mat33, mat99
 from .valid import require
 from .yeoh import Yeoh, yeoh_parts

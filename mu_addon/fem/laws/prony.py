@@ -7,8 +7,9 @@ from typing import Any
 
 import warp as wp
 
+from ...arrays import Array
 from .isochoric import split
-from .law import Array, Law
+from .law import Law
 from .tensors import THIRD, add_left, f64, isochoric, mat33, mat99, put_symmetric, symmetric_at
 from .yeoh import Yeoh, yeoh_parts, yeoh_slope
 

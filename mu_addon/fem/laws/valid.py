@@ -6,9 +6,8 @@ from typing import Any
 
 import numpy as np
 
+from ...arrays import Array
 from ...errors import InputError
-
-Array = np.ndarray[Any, Any]
 
 
 def require(good: Array, law: Any, name: str, values: Array, wanted: str, remedy: str) -> None:
