@@ -22,7 +22,7 @@ from ..design.strut_cell import StrutCell
 from ..fem.elements import even_points, reference_gradients, shape_functions, shape_gradients
 from ..homogenize.cell_mesh import CellMeshSettings, mesh_cell
 from ..meshing.mesh import FLIPPED_TET, TET_FACES, Mesh, mirror
-from ..meshing.surface import Surface, winding_number
+from ..meshing.surface import winding_number
 from ..meshing.tiling import tiled
 from .graph_axes import graded_about_axes
 from .octants import graded_nodes
@@ -103,13 +103,12 @@ def cuts(d: Dimensions, body: Body | None) -> list[Depth]:
     """Boundaries of the struts: functions of points (n, 3) in mm, positive (n,) where the struts remain."""
     found: list[Depth] = [lambda points: clearance(d, points)]
     if body is not None:
-        surface = Surface(body.vertices, body.triangles)
         low, high = body.bounds
 
         def inside(points: Array) -> Array:
             kept = np.full(len(points), -1.0)
             near = np.flatnonzero(((points > low) & (points < high)).all(axis=1))
-            kept[near] = winding_number(surface, points[near]) - 0.5
+            kept[near] = winding_number(body.vertices, body.triangles, points[near]) - 0.5
             return kept
 
         found.append(inside)

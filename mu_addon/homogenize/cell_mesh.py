@@ -77,8 +77,7 @@ def mesh_cell(cell: StrutCell, settings: CellMeshSettings | None = None, cache: 
     else:
         raise MeshingError(failed.what, f"cell mesh, in halves of its size: {failed.where}", failed.remedy)
     _require_faces(mesh)
-    nothing = mesh.base[:0]
-    return attrs.evolve(mesh, nodes=mesh.nodes * half, base=nothing, tip=nothing)
+    return attrs.evolve(mesh, nodes=mesh.nodes * half)
 
 
 def cell_materials(cell: StrutCell, mesh: Mesh, modulus_MPa: float, poisson: float) -> Materials:

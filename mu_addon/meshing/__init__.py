@@ -1,4 +1,4 @@
-"""Meshing: labelled tetrahedra of any closed surface, and the grid of a unit's wall.
+"""Meshing: tetrahedra of any closed surface, and the grid of a unit's wall.
 
 `WallGrid` places the elements of a unit's wall; `mesh_surface` fills any closed surface (pytetwild). A `Mesh`
 is plain arrays: nodes, tetrahedra of order 1 or 2, the region of each, and the surfaces that loads act on.
@@ -21,8 +21,6 @@ if TYPE_CHECKING:
     from .quality import Quality as Quality
     from .quality import mesh_quality as mesh_quality
     from .settings import MeshSettings as MeshSettings
-    from .surface import VOID as VOID
-    from .surface import Surface as Surface
     from .surface import mesh_surface as mesh_surface
     from .wall_and_cavity import WallGrid as WallGrid
 else:

@@ -1,4 +1,4 @@
-"""Labelled tetrahedra inside any closed surface mesh, by pytetwild, cached because it has no seed."""
+"""Tetrahedra inside any closed surface mesh, by pytetwild, cached because it has no seed."""
 
 from __future__ import annotations
 
@@ -7,36 +7,23 @@ import hashlib
 import sys
 import tempfile
 import types
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
-import attrs
 import numpy as np
 
 from ..arrays import Array
+from ..design.surface import bad_edges
 from ..errors import InputError, MeshingError
 from ..files import read_npz, write_npz
 from .mesh import LATTICE, Mesh, boundary_faces, edges_of, oriented, second_order
 from .quality import check_positive
 
-VOID = 0
 # Without a seed pytetwild gives another mesh each time; a sliver on a side made flat is bad luck.
 _ATTEMPTS = 4
 # Its worst elements have 0.06 to 0.09 of a regular one's volume, those made flat 0 but for rounding.
 _FLAT = 1e-3
-
-
-@attrs.frozen(eq=False)
-class Surface:
-    """A closed triangulated surface: vertices (n, 3) in mm, triangles (f, 3) with normals outward.
-
-    region: of the space that it encloses, LATTICE, MEMBRANE or VOID.
-    """
-
-    vertices: Array
-    triangles: Array
-    region: int = VOID
 
 
 def mesh_surface(
@@ -44,35 +31,28 @@ def mesh_surface(
     triangles: Array,
     edge_mm: float,
     *,
-    region: int = LATTICE,
-    inside: Sequence[Surface] = (),
-    classify: Callable[[Array], Array] | None = None,
     epsilon_mm: float | None = None,
     order: int = 1,
-    symmetry: tuple[str, ...] = (),
     cache: Path | None = None,
 ) -> Mesh:
-    """Fill a closed surface, vertices (n, 3) in mm and triangles (f, 3) outward, with tetrahedra.
+    """Fill a closed surface, vertices (n, 3) in mm and triangles (f, 3) outward, with tetrahedra (LATTICE).
 
     Elements are about edge_mm long; the result stays within epsilon_mm of the surface (a fiftieth of edge_mm
-    if not given). Each tetrahedron belongs to the last surface of `inside` that encloses its centroid by
-    winding number, else to `region`; or `classify` maps centroids (m, 3) to regions (m,). Elements in VOID
-    are left out, and its wall becomes the cavity. Sides on the bounding box are made exactly flat. The lowest
-    and highest in z are base and tip; those of `symmetry` must be at zero. Elements of order 2 are
-    straight-sided. With a cache folder the same input always gives the same mesh. Raises InputError for a
-    surface that is not closed, OutputError for a cache that cannot be written, and MeshingError.
+    if not given). Sides on the bounding box are made exactly flat; base and tip are empty. Elements of order
+    2 are straight-sided. With a cache folder the same input always gives the same mesh. Raises InputError for
+    a surface that is not closed, OutputError for a cache that cannot be written, and MeshingError.
     """
-    outer = Surface(np.asarray(vertices, float), np.asarray(triangles), region)
-    surfaces = [outer, *inside]
-    for surface in surfaces:
-        _require_closed(surface)
-    starts = np.cumsum([0, *[len(s.vertices) for s in surfaces]])
-    points = np.vstack([s.vertices for s in surfaces])
-    faces = np.vstack([s.triangles + start for s, start in zip(surfaces, starts, strict=False)])
+    points, faces = np.asarray(vertices, float), np.asarray(triangles)
+    if bad_edges(faces):
+        raise InputError(
+            "a surface to be meshed is not closed and consistently oriented",
+            f"{len(faces)} triangles",
+            "close its holes, merge its double vertices and make its normals point outward",
+        )
     epsilon = edge_mm / 50 if epsilon_mm is None else epsilon_mm
     for attempt in range(_ATTEMPTS):
         nodes, tets = _cached(cache, points, faces.astype(np.int32), edge_mm, epsilon, anew=attempt > 0)
-        mesh = _labelled(nodes, oriented(nodes, tets), surfaces, classify, epsilon, order, symmetry)
+        mesh = _inside(points, faces, nodes, oriented(nodes, tets), epsilon, order)
         if not (_fullness(mesh) < _FLAT).any():
             break
     check_positive(mesh)
@@ -87,55 +67,30 @@ def _fullness(mesh: Mesh) -> Array:
     return np.asarray(6 * np.sqrt(2) * volume / longest**3)
 
 
-def _labelled(
-    nodes: Array,
-    tets: Array,
-    surfaces: Sequence[Surface],
-    classify: Callable[[Array], Array] | None,
-    epsilon: float,
-    order: int,
-    symmetry: tuple[str, ...],
-) -> Mesh:
-    """The tetrahedra inside the first surface, without voids, labelled, and flat where its box is."""
-    outer, *inside = surfaces
-    tets = tets[winding_number(outer, nodes[tets].mean(axis=1)) > 0.5]
-    centroids = nodes[tets].mean(axis=1)
-    if classify is not None:
-        label = np.asarray(classify(centroids))
-    else:
-        label = np.full(len(tets), outer.region)
-        for surface in inside:
-            label[winding_number(surface, centroids) > 0.5] = surface.region
-    kept = label != VOID
-    outside, _ = boundary_faces(tets)
-    used, dense = np.unique(tets[kept], return_inverse=True)
+def _inside(points: Array, faces: Array, nodes: Array, tets: Array, epsilon: float, order: int) -> Mesh:
+    """The tetrahedra inside a surface, flat where its box is."""
+    tets = tets[winding_number(points, faces, nodes[tets].mean(axis=1)) > 0.5]
+    used, dense = np.unique(tets, return_inverse=True)
     if not len(used):
         raise MeshingError("no element is left inside the surface", "pytetwild", "make edge_mm smaller")
-    number = np.full(len(nodes), -1)
-    number[used] = np.arange(len(used))
     nodes, tets = nodes[used], np.reshape(dense, (-1, 4))
-    faces, _ = boundary_faces(tets)
-    was_outside = {tuple(f) for f in np.sort(number[outside], axis=1).tolist()}
-    walls = np.array([tuple(f) not in was_outside for f in np.sort(faces, axis=1).tolist()])
-    cavity = faces[walls]
-
-    bounds = np.array([outer.vertices.min(axis=0), outer.vertices.max(axis=0)])
-    for column, plane in ((c, p) for c in range(3) for p in bounds[:, c]):
-        _flatten(nodes, faces[~walls], column, plane, epsilon)
+    outside, none = boundary_faces(tets)[0], np.zeros((0, 3), np.int32)
+    for column, plane in ((c, p) for c in range(3) for p in (points[:, c].min(), points[:, c].max())):
+        near = np.all(np.abs(nodes[outside][:, :, column] - plane) <= 2 * epsilon, axis=1)
+        nodes[np.unique(outside[near]), column] = plane
     if order == 2:
         edges, _ = edges_of(tets)
-        nodes, tets, cavity = second_order(nodes, tets, cavity, nodes[edges].mean(axis=1))
-    base, tip = (np.flatnonzero(nodes[:, 2] == z) for z in bounds[:, 2])
-    return Mesh(nodes, tets, label[kept], cavity, base, tip, symmetry)
+        nodes, tets, none = second_order(nodes, tets, none, nodes[edges].mean(axis=1))
+    return Mesh(nodes, tets, np.full(len(tets), LATTICE), none, base=[], tip=[])
 
 
-def winding_number(surface: Surface, points: Array) -> Array:
+def winding_number(vertices: Array, triangles: Array, points: Array) -> Array:
     """Winding number (n,) of a closed surface around points (n, 3) in mm: 1 inside, 0 outside.
 
-    The sum of its triangles' solid angles over 4 pi. Source: Van Oosterom and Strackee, IEEE Trans. Biomed.
-    Eng. BME-30 (1983) 125.
+    The sum of the solid angles of its triangles (f, 3) over 4 pi. Source: Van Oosterom and Strackee,
+    IEEE Trans. Biomed. Eng. BME-30 (1983) 125.
     """
-    corners = surface.vertices[surface.triangles]
+    corners = vertices[triangles]
     result = np.empty(len(points))
     step = max(1, 500_000 // max(1, len(corners)))
     for start in range(0, len(points), step):
@@ -148,31 +103,15 @@ def winding_number(surface: Surface, points: Array) -> Array:
     return result
 
 
-def _require_closed(surface: Surface) -> None:
-    """Raise InputError unless every edge is used once in each direction."""
-    directed = surface.triangles[:, [[0, 1], [1, 2], [2, 0]]].reshape(-1, 2)
-    forward, backward = (np.unique(d, axis=0) for d in (directed, directed[:, ::-1]))
-    if len(forward) != len(directed) or not np.array_equal(forward, backward):
-        raise InputError(
-            "a surface to be meshed is not closed and consistently oriented",
-            f"{len(surface.triangles)} triangles",
-            "close its holes, merge its double vertices and make its normals point outward",
-        )
-
-
-def _flatten(nodes: Array, faces: Array, column: int, plane: float, epsilon: float) -> None:
-    """Move faces lying near a plane, by the tolerance they were meshed with, exactly onto it."""
-    near = np.all(np.abs(nodes[faces][:, :, column] - plane) <= 2 * epsilon, axis=1)
-    nodes[np.unique(faces[near]), column] = plane
-
-
 def _cached(
     cache: Path | None, points: Array, faces: Array, edge: float, epsilon: float, *, anew: bool
 ) -> tuple[Array, Array]:
     """pytetwild's nodes and tets for an input: from the cache folder if it holds them, else computed."""
     if cache is None:
         return _tetrahedralize(points, faces, edge, epsilon)
-    digest = hashlib.sha256(repr((points.shape, faces.shape, edge, epsilon, _version())).encode())
+    digest = hashlib.sha256(
+        repr((points.shape, faces.shape, edge, epsilon, str(load_pytetwild().__version__))).encode()
+    )
     digest.update(np.ascontiguousarray(points).tobytes())
     digest.update(np.ascontiguousarray(faces).tobytes())
     path = Path(cache) / f"tetwild-{digest.hexdigest()[:32]}.npz"
@@ -234,7 +173,3 @@ def _pyvista_stand_in() -> Iterator[None]:
         yield
     finally:
         del sys.modules["pyvista"]
-
-
-def _version() -> str:
-    return str(load_pytetwild().__version__)

@@ -108,13 +108,12 @@ def division(length: float, edge: float) -> int:
 class Membrane:
     """Linear tetrahedra of the membrane and the middles that make them quadratic.
 
-    nodes (n, 3) in mm, tets (m, 4); outside and cavity (f, 3): triangles towards the lattice and of the
-    cavity, normals out of the solid; middles (e, 3) in mm: on the true surface, of each of `edges_of(tets)`.
+    nodes (n, 3) in mm, tets (m, 4); cavity (f, 3): triangles of the cavity, normals out of the
+    solid; middles (e, 3) in mm: on the true surface, of each of `edges_of(tets)`.
     """
 
     nodes: Array
     tets: Array
-    outside: Array
     cavity: Array
     middles: Array
 
@@ -151,8 +150,7 @@ def membrane_mesh(meridian: Meridian, p: Array, sectors: int, layers: int, rings
     depth, height = coordinates[:, 2], coordinates[:, 0]
     on_cavity = (depth == 1.0) & ~((height < low) | (height > high))
     on_cavity |= (depth > 1.0) & ((height == low) | (height == high))
-    outside = faces[np.all(depth[faces] == 0.0, axis=1)]
-    return Membrane(nodes, tets, outside, faces[np.all(on_cavity[faces], axis=1)], middles)
+    return Membrane(nodes, tets, faces[np.all(on_cavity[faces], axis=1)], middles)
 
 
 def _five_each(ids: Array, solid: Array) -> Array:

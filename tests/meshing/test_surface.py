@@ -1,4 +1,4 @@
-"""Any closed surface by pytetwild: regions, cavity, cache, and what is refused."""
+"""Any closed surface by pytetwild: sides, cache, and what is refused."""
 
 from __future__ import annotations
 
@@ -14,18 +14,14 @@ from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 
 from mu_addon.errors import InputError, MeshingError
-from mu_addon.meshing import LATTICE, MEMBRANE, VOID, Surface, mesh_surface
+from mu_addon.meshing import LATTICE, mesh_surface
 from mu_addon.meshing.mesh import Mesh, boundary_faces, oriented
-from mu_addon.meshing.quality import cavity_enclosed, element_volumes
+from mu_addon.meshing.quality import element_volumes
 from mu_addon.meshing.surface import _fullness, winding_number
 
 
 def sphere(radius: float, subdivisions: int = 2) -> trimesh.Trimesh:
     return trimesh.creation.icosphere(subdivisions, radius)
-
-
-def surface(body: trimesh.Trimesh, region: int = VOID) -> Surface:
-    return Surface(np.asarray(body.vertices), np.asarray(body.faces), region)
 
 
 def test_a_ball() -> None:
@@ -38,42 +34,14 @@ def test_a_ball() -> None:
     assert element_volumes(mesh).sum() == pytest.approx(ball.volume, rel=0.02)
 
 
-def test_nested_spheres_are_told_apart() -> None:
-    outer, middle, inner = sphere(10.0), sphere(7.0), sphere(4.0)
-    mesh = mesh_surface(
-        outer.vertices,
-        outer.faces,
-        4.0,
-        inside=[surface(middle, MEMBRANE), surface(inner)],
-        order=2,
-    )
-    volumes = element_volumes(mesh)
-    assert mesh.order == 2
-    assert volumes.min() > 0
-    assert volumes[mesh.region == MEMBRANE].sum() == pytest.approx(middle.volume - inner.volume, rel=0.04)
-    assert volumes[mesh.region == LATTICE].sum() == pytest.approx(outer.volume - middle.volume, rel=0.04)
-    assert cavity_enclosed(mesh) == pytest.approx(inner.volume, rel=0.04)
-    assert np.linalg.norm(mesh.nodes[mesh.cavity_corners], axis=2) == pytest.approx(4.0, abs=0.3)
-    # The cavity is closed, and no face of the outside is among its faces.
-    directed = mesh.cavity_corners[:, [[0, 1], [1, 2], [2, 0]]].reshape(-1, 2)
-    assert len(np.unique(np.vstack([directed, directed[:, ::-1]]), axis=0)) == len(directed)
-    faces, _ = boundary_faces(mesh.tets)
-    assert len(faces) > len(mesh.cavity)
-
-
-def test_a_box_has_flat_ends_and_a_classifier_tags_it() -> None:
+def test_a_box_of_order_two_has_flat_sides() -> None:
     box = trimesh.creation.box((8.0, 6.0, 10.0))
-    mesh = mesh_surface(
-        box.vertices,
-        box.faces,
-        3.0,
-        classify=lambda points: np.where(points[:, 0] > 0, MEMBRANE, LATTICE),
-    )
-    assert np.all(mesh.nodes[mesh.base, 2] == -5.0)
-    assert np.all(mesh.nodes[mesh.tip, 2] == 5.0)
-    assert element_volumes(mesh).sum() == pytest.approx(480.0, rel=2e-3)
-    centroids = mesh.nodes[mesh.corners].mean(axis=1)
-    assert np.array_equal(mesh.region == MEMBRANE, centroids[:, 0] > 0)
+    mesh = mesh_surface(box.vertices, box.faces, 3.0, order=2)
+    faces, _ = boundary_faces(mesh.tets)
+    assert np.all((np.abs(mesh.nodes[faces]) == [4.0, 3.0, 5.0]).all(axis=1).any(axis=1))
+    assert mesh.order == 2
+    assert element_volumes(mesh).min() > 0
+    assert element_volumes(mesh).sum() == pytest.approx(480.0, rel=1e-9)
 
 
 def test_the_cache_makes_it_repeatable(tmp_path: Path) -> None:
@@ -150,4 +118,4 @@ def test_winding_number_counts_inside_once(points: np.ndarray) -> None:
     radius = np.linalg.norm(points, axis=1)
     points = points[np.abs(radius - 5) > 0.3]
     expected = np.linalg.norm(points, axis=1) < 5
-    assert np.allclose(winding_number(surface(ball), points), expected, atol=1e-9)
+    assert np.allclose(winding_number(ball.vertices, ball.faces, points), expected, atol=1e-9)
