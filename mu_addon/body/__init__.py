@@ -14,8 +14,8 @@ from typing import TYPE_CHECKING
 from ..lazy import public_face
 
 if TYPE_CHECKING:
-    from .candidates import PrintedWaveguides as PrintedWaveguides
-    from .printed_mesh import mesh_printed as mesh_printed
-    from .strut import strut_mesh as strut_mesh
+    from .candidates import PrintedWaveguides
+    from .printed_mesh import mesh_printed
+    from .strut import strut_mesh
 else:
     __getattr__, __dir__, __all__ = public_face(__name__)

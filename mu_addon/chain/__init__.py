@@ -14,20 +14,12 @@ from typing import TYPE_CHECKING
 from ..lazy import public_face
 
 if TYPE_CHECKING:
-    from .chain import Chain as Chain
-    from .chain import ChainState as ChainState
-    from .chain import Link as Link
-    from .chain import Loads as Loads
-    from .inverse import Reach as Reach
-    from .inverse import reach_point as reach_point
-    from .joint import Joint as Joint
-    from .joint_learning import Learned as Learned
-    from .joint_learning import Sampling as Sampling
-    from .joint_learning import learn as learn
-    from .motion import Motion as Motion
-    from .motion import move as move
-    from .pressures import Pressures as Pressures
-    from .pressures import read_pressures as read_pressures
-    from .shape import Shape as Shape
+    from .chain import Chain, ChainState, Link, Loads
+    from .inverse import Reach, reach_point
+    from .joint import Joint
+    from .joint_learning import Learned, Sampling, learn
+    from .motion import Motion, move
+    from .pressures import Pressures, read_pressures
+    from .shape import Shape
 else:
     __getattr__, __dir__, __all__ = public_face(__name__)

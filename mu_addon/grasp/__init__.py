@@ -13,15 +13,8 @@ from typing import TYPE_CHECKING
 from ..lazy import public_face
 
 if TYPE_CHECKING:
-    from .hand import Grasp as Grasp
-    from .hand import Lift as Lift
-    from .hand import grasp as grasp
-    from .phases import MEANING as MEANING
-    from .phases import NAMES as NAMES
-    from .phases import Phases as Phases
-    from .phases import read_phases as read_phases
-    from .phases import shipped_phases as shipped_phases
-    from .settings import Contact as Contact
-    from .settings import Cube as Cube
+    from .hand import Grasp, Lift, grasp
+    from .phases import MEANING, NAMES, Phases, read_phases, shipped_phases
+    from .settings import Contact, Cube
 else:
     __getattr__, __dir__, __all__ = public_face(__name__)

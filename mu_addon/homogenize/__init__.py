@@ -15,33 +15,24 @@ from typing import TYPE_CHECKING
 from ..lazy import public_face
 
 if TYPE_CHECKING:
-    from .bounds import hashin_shtrikman as hashin_shtrikman
-    from .cell_mesh import CellMeshSettings as CellMeshSettings
-    from .cell_mesh import cell_materials as cell_materials
-    from .cell_mesh import mesh_cell as mesh_cell
-    from .compression import STRAINS as STRAINS
-    from .compression import Compression as Compression
-    from .compression import Friction as Friction
-    from .compression import Limits as Limits
-    from .compression import Plates as Plates
-    from .compression import Reached as Reached
-    from .compression import compress as compress
-    from .compression import compression_of as compression_of
-    from .compression import limits_of as limits_of
-    from .effective_file import effective_text as effective_text
-    from .elasticity import Elasticity as Elasticity
-    from .elasticity import effective_tensor as effective_tensor
-    from .elasticity import young_modulus as young_modulus
-    from .foam_fit import FoamFit as FoamFit
-    from .foam_fit import fit_foam as fit_foam
-    from .foam_fit import lattice_law as lattice_law
-    from .specimen import Specimen as Specimen
-    from .specimen import block_specimen as block_specimen
-    from .stress_strain_curve import DEFAULT as DEFAULT
-    from .stress_strain_curve import Curve as Curve
-    from .stress_strain_curve import moduli as moduli
-    from .stretch import Stretched as Stretched
-    from .stretch import StretchSettings as StretchSettings
-    from .stretch import stretch_lattice as stretch_lattice
+    from .bounds import hashin_shtrikman
+    from .cell_mesh import CellMeshSettings, cell_materials, mesh_cell
+    from .compression import (
+        STRAINS,
+        Compression,
+        Friction,
+        Limits,
+        Plates,
+        Reached,
+        compress,
+        compression_of,
+        limits_of,
+    )
+    from .effective_file import effective_text
+    from .elasticity import Elasticity, effective_tensor, young_modulus
+    from .foam_fit import FoamFit, fit_foam, lattice_law
+    from .specimen import Specimen, block_specimen
+    from .stress_strain_curve import DEFAULT, Curve, moduli
+    from .stretch import Stretched, StretchSettings, stretch_lattice
 else:
     __getattr__, __dir__, __all__ = public_face(__name__)

@@ -13,15 +13,11 @@ from typing import TYPE_CHECKING
 from ..lazy import public_face
 
 if TYPE_CHECKING:
-    from .gmsh_model import GmshUnavailable as GmshUnavailable
-    from .mesh import LATTICE as LATTICE
-    from .mesh import MEMBRANE as MEMBRANE
-    from .mesh import Mesh as Mesh
-    from .mesh import mirror as mirror
-    from .quality import Quality as Quality
-    from .quality import mesh_quality as mesh_quality
-    from .settings import MeshSettings as MeshSettings
-    from .surface import mesh_surface as mesh_surface
-    from .wall_and_cavity import WallGrid as WallGrid
+    from .gmsh_model import GmshUnavailable
+    from .mesh import LATTICE, MEMBRANE, Mesh, mirror
+    from .quality import Quality, mesh_quality
+    from .settings import MeshSettings
+    from .surface import mesh_surface
+    from .wall_and_cavity import WallGrid
 else:
     __getattr__, __dir__, __all__ = public_face(__name__)

@@ -14,23 +14,11 @@ from typing import TYPE_CHECKING
 from ..lazy import public_face
 
 if TYPE_CHECKING:
-    from .candidates import Candidate as Candidate
-    from .candidates import Evaluation as Evaluation
-    from .candidates import candidate_paths as candidate_paths
-    from .candidates import evaluation as evaluation
-    from .deviation import Deviation as Deviation
-    from .deviation import centreline as centreline
-    from .deviation import centreline_deviation as centreline_deviation
-    from .deviation import rank as rank
-    from .graph import Graph as Graph
-    from .graph import Limits as Limits
-    from .graph import lattice_graph as lattice_graph
-    from .response import Response as Response
-    from .search import Search as Search
-    from .search import SearchSettings as SearchSettings
-    from .search import search_paths as search_paths
-    from .sensitivity_map import Influence as Influence
-    from .sensitivity_map import deviation_map as deviation_map
-    from .sensitivity_map import influence_map as influence_map
+    from .candidates import Candidate, Evaluation, candidate_paths, evaluation
+    from .deviation import Deviation, centreline, centreline_deviation, rank
+    from .graph import Graph, Limits, lattice_graph
+    from .response import Response
+    from .search import Search, SearchSettings, search_paths
+    from .sensitivity_map import Influence, deviation_map, influence_map
 else:
     __getattr__, __dir__, __all__ = public_face(__name__)

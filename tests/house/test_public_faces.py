@@ -43,7 +43,7 @@ def test_every_name_of_a_public_face_resolves(package):
 def test_the_type_checker_sees_the_same_names(package):
     tree = ast.parse((FOLDER / package / "__init__.py").read_text())
     imports = [n for n in ast.walk(tree) if isinstance(n, ast.ImportFrom) and n.level == 1]
-    checked = {alias.asname for node in imports for alias in node.names}
+    checked = {alias.name for node in imports for alias in node.names}
     assert checked == set(importlib.import_module(f"mu_addon.{package}").__all__)
     modules = {path.stem for path in (FOLDER / package).iterdir()}
     assert not checked & modules, "a module of that name would take its place"
