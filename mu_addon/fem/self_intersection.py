@@ -9,6 +9,7 @@ import attrs
 import numpy as np
 
 from ..arrays import Array
+from ..design.printing.crossing import near_pairs
 from ..meshing.mesh import LATTICE, TET_EDGES, Mesh, boundary_faces, mirror, mirror_displacement
 from .state import State
 
@@ -48,15 +49,9 @@ def _text(place: Array) -> str:
 
 @attrs.frozen(eq=False)
 class FirstSelfIntersection:
-    """Pressure in MPa at which walls first touch, between two states of a path, and the crossings there.
-
-    before_MPa, after_MPa: of the two states. Between them the body is taken to move along a straight line;
-    `crossings` are those found at `pressure_MPa`, where the first of them begins.
-    """
+    """Pressure in MPa at which walls first touch along a path of states, and the crossings there."""
 
     pressure_MPa: float
-    before_MPa: float
-    after_MPa: float
     crossings: tuple[Crossing, ...]
 
 
@@ -80,7 +75,7 @@ def first_self_intersection(mesh: Mesh, states: Sequence[State]) -> FirstSelfInt
                 low = middle
         first = surface.crossings(before.u + high * (after.u - before.u))
         pressure = before.pressure_MPa + high * (after.pressure_MPa - before.pressure_MPa)
-        return FirstSelfIntersection(pressure, before.pressure_MPa, after.pressure_MPa, first)
+        return FirstSelfIntersection(pressure, first)
     return None
 
 
@@ -130,21 +125,17 @@ class _Boundary:
 
     def _near(self, corners: Array) -> Array:
         """Pairs (p, 2) of facets with overlapping boxes and no common node, not both of them images."""
-        low, high = corners.min(axis=1), corners.max(axis=1)
-        radii = np.linalg.norm(high - low, axis=1) / 2
-        radius = radii.max()
-        pairs = _within_reach((low + high) / 2, radii)
+        pairs = np.sort(np.concatenate(list(near_pairs(corners))), axis=1)
+        pairs = pairs[np.lexsort(pairs.T[::-1])]
+        pairs = pairs[self._own[pairs].any(axis=1)]
         a, b = pairs.T
-        keep = (
-            (self._own[a] | self._own[b]) & (low[a] <= high[b]).all(axis=1) & (low[b] <= high[a]).all(axis=1)
-        )
-        a, b = pairs[keep].T
         apart = ~(self.facets[a][:, :, None] == self.facets[b][:, None, :]).any(axis=(1, 2))
         mixed = self._of_strut[a] != self._of_strut[b]
         if mixed.any():
             middle = self._rest[self.facets].mean(axis=1)
-            apart &= ~mixed | (np.linalg.norm(middle[a] - middle[b], axis=1) > 2 * radius)
-        return pairs[keep][apart]
+            largest = np.linalg.norm(np.ptp(corners, axis=1), axis=1).max()
+            apart &= ~mixed | (np.linalg.norm(middle[a] - middle[b], axis=1) > largest)
+        return pairs[apart]
 
     def _groups(self, pairs: Array) -> list[Array]:
         """Pairs (p, 2) of facets in groups, those whose facets share nodes together, the largest first."""
@@ -171,27 +162,6 @@ class _Boundary:
         walls = self._rest[self.facets[nearest]].mean(axis=1)
         one, other = self._inner[nearest]
         return Crossing(place, walls, (bool(one), bool(other)), len(pairs))
-
-
-def _within_reach(centres: Array, radii: Array) -> Array:
-    """Pairs (p, 2), ascending, of spheres (f, 3) with radii (f,) that may overlap, each once.
-
-    By octaves of the radii: the reach of the largest spheres is that of few.
-    """
-    from scipy.spatial import cKDTree
-
-    octave = np.floor(np.log2(np.maximum(radii / radii.max(), 1e-6))).astype(int)
-    sets = [np.flatnonzero(octave == o) for o in np.unique(octave)]
-    trees = [cKDTree(centres[own]) for own in sets]
-    found = [np.zeros((0, 2), int)]
-    for i, (own, tree) in enumerate(zip(sets, trees, strict=True)):
-        most = radii[own].max()
-        found.append(own[tree.query_pairs(2 * most, output_type="ndarray")])
-        for other, more in zip(sets[:i], trees[:i], strict=True):
-            near = tree.sparse_distance_matrix(more, most + radii[other].max(), output_type="ndarray")
-            found.append(np.stack([own[near["i"]], other[near["j"]]], axis=1))
-    pairs = np.sort(np.concatenate(found), axis=1)
-    return pairs[np.lexsort(pairs.T[::-1])]
 
 
 def with_middles(faces: Array, tets: Array) -> Array:
