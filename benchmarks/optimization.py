@@ -14,10 +14,11 @@ import numpy as np
 
 from benchmarks.table import options_of
 from mu_addon.errors import InputError
+from mu_addon.generators import value_of
 from mu_addon.meshing.settings import MeshSettings
 from mu_addon.optimization.design_file import parse_design
 from mu_addon.optimization.evaluation import evaluate
-from mu_addon.optimization.search import Observed, SearchSettings, search_units
+from mu_addon.optimization.search import Observed, Search, SearchSettings
 from mu_addon.optimization.unit_body import Mechanics
 
 ASKED = """
@@ -103,7 +104,8 @@ def ours(counted: Counted, budget: int, seed: int) -> None:
     """The search of mu_addon."""
     d = counted.design
     settings = SearchSettings(evaluations=int(budget / 1.5), seed=seed)
-    search_units(d.freedoms, d.targets, lambda xs: [counted.one(x) for x in xs], d.start, settings)
+    steps = Search(d.freedoms, d.targets, settings).steps(d.start)
+    value_of(steps, lambda xs: [counted.one(x) for x in xs])
 
 
 def random(counted: Counted, budget: int, seed: int) -> None:

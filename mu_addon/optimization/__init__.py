@@ -2,7 +2,7 @@
 them.
 
 `gradients` differentiates quantities of a body in equilibrium by any number of freedoms; `evaluate` does so
-for a unit; `search_units` proposes units by a surrogate that interpolates values and slopes.
+for a unit; `unit_search` proposes units by a surrogate that interpolates values and slopes.
 
     >>> from mu_addon.optimization import Freedom
     >>> Freedom("chambers.wall_mm", 0.6, 1.4).at(0.5)

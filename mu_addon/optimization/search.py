@@ -10,14 +10,13 @@ the Pareto front.
 from __future__ import annotations
 
 import itertools
-from collections.abc import Callable, Generator, Iterator, Sequence
+from collections.abc import Generator, Iterator, Sequence
 from typing import Any
 
 import attrs
 import numpy as np
 
 from ..arrays import Array
-from ..generators import value_of
 from .freedoms import Freedom
 from .settings import BATCH, EVALUATIONS, SEED
 from .surrogate import Surrogate, fit_all
@@ -76,23 +75,6 @@ class Found:
         if len(chosen) > most:
             chosen = chosen[np.unique(np.linspace(0, len(chosen) - 1, most).round().astype(int))]
         return [n for n in chosen.tolist() if self.observed[n].sound]
-
-
-Observe = Callable[[Sequence[Values]], Sequence[Observed]]
-
-
-def search_units(
-    freedoms: Sequence[Freedom],
-    targets: Sequence[Target],
-    observe: Observe,
-    start: Values,
-    settings: SearchSettings | None = None,
-) -> Found:
-    """Find designs for some targets, from a start, which may violate bounds of its freedoms.
-
-    observe: computes designs.
-    """
-    return value_of(Search(freedoms, targets, settings or SearchSettings()).steps(start), observe)
 
 
 class Search:

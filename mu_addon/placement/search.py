@@ -10,7 +10,6 @@ import numpy as np
 
 from ..arrays import Array
 from ..errors import InputError
-from ..generators import value_of
 
 
 @attrs.frozen
@@ -71,19 +70,6 @@ def probability_of_better(predicted_mm: Array, exact_mm: Array) -> float:
     if spread == 0:
         return float((needed > 0).any())
     return float(min(t.cdf(needed / spread, n - 1).sum(), 1.0))
-
-
-def search_paths(
-    predicted_mm: Array,
-    check: Callable[[list[int]], Sequence[float]],
-    settings: SearchSettings | None = None,
-) -> Search:
-    """Solve paths in the order of their predicted deviation until no other is likely to beat the best.
-
-    check: maps numbers of k paths to their exact J_hat (k,) in mm, NaN for those that are impossible and
-    left out. Otherwise as `searching`; raises whatever `check` raises, too.
-    """
-    return value_of(searching(predicted_mm, settings), check)
 
 
 def searching(

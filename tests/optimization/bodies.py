@@ -6,13 +6,18 @@ import numpy as np
 from mu_addon.fem.materials import Materials
 from mu_addon.fem.model import Model
 from mu_addon.fem.moved_nodes import relocated
+from mu_addon.generators import value_of
 from mu_addon.optimization.gradient import gradients
 from mu_addon.optimization.quantities import RestStiffness
-from mu_addon.optimization.search import Observed
+from mu_addon.optimization.search import Observed, Search, SearchSettings
 from mu_addon.optimization.structure import Structure, solve
 from tests.fem.bodies import box, uniform
 
 LENGTH, MODULUS = 40.0, 2.0
+
+
+def search_units(freedoms, targets, observe, start, settings=None):
+    return value_of(Search(freedoms, targets, settings or SearchSettings()).steps(start), observe)
 
 
 @attrs.frozen

@@ -6,7 +6,7 @@ import pytest
 from mu_addon.optimization.freedoms import Freedom
 from mu_addon.optimization.gradient import gradients
 from mu_addon.optimization.quantities import RestStiffness
-from mu_addon.optimization.search import SearchSettings, search_units
+from mu_addon.optimization.search import SearchSettings
 from mu_addon.optimization.structure import solve
 from mu_addon.optimization.targets import Target
 
@@ -20,6 +20,7 @@ from .bodies import (
     Resin,
     Volume,
     fold_stiffness,
+    search_units,
 )
 
 FREE = [Freedom("a", 1.0, 4.0), Freedom("b", 1.0, 4.0)]

@@ -6,8 +6,10 @@ import numpy as np
 import pytest
 
 from mu_addon.optimization.freedoms import Freedom
-from mu_addon.optimization.search import Observed, SearchSettings, pareto, search_units
+from mu_addon.optimization.search import Observed, SearchSettings, pareto
 from mu_addon.optimization.targets import Target
+
+from .bodies import search_units
 
 
 @attrs.frozen

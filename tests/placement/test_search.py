@@ -4,7 +4,12 @@ import numpy as np
 import pytest
 
 from mu_addon.errors import InputError
-from mu_addon.placement.search import SearchSettings, front, probability_of_better, search_paths
+from mu_addon.generators import value_of
+from mu_addon.placement.search import SearchSettings, front, probability_of_better, searching
+
+
+def search_paths(predicted_mm, check, settings=None):
+    return value_of(searching(predicted_mm, settings), check)
 
 
 def test_a_perfect_prediction_needs_only_the_first_checks():
