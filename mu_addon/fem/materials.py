@@ -8,17 +8,9 @@ from typing import Any
 import attrs
 import numpy as np
 
-from ..arrays import Array
+from ..arrays import Array, float64, int32
 from ..errors import InputError
 from .laws import NeoHooke
-
-
-def _integers(values: Any) -> Array:
-    return np.ascontiguousarray(values, np.int32)
-
-
-def _rows(values: Any) -> Array:
-    return np.ascontiguousarray(values, np.float64)
 
 
 @attrs.frozen(eq=False)
@@ -30,9 +22,9 @@ class Layer:
     """
 
     law: Any
-    elements: Array = attrs.field(converter=_integers)
-    parameters: Array = attrs.field(converter=_rows)
-    weight: Array = attrs.field(default=1.0, converter=_rows)
+    elements: Array = attrs.field(converter=int32)
+    parameters: Array = attrs.field(converter=float64)
+    weight: Array = attrs.field(default=1.0, converter=float64)
 
     def __attrs_post_init__(self) -> None:
         k = len(self.elements)

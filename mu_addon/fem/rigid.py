@@ -7,12 +7,8 @@ from typing import Any, Protocol
 import attrs
 import numpy as np
 
-from ..arrays import Array
+from ..arrays import Array, float64
 from ..errors import InputError
-
-
-def _float64(values: Any) -> Array:
-    return np.ascontiguousarray(values, np.float64)
 
 
 class Rigid(Protocol):
@@ -27,7 +23,7 @@ class Rigid(Protocol):
 
 
 def _unit(vector: Any) -> Array:
-    v = _float64(vector)
+    v = float64(vector)
     length = float(np.linalg.norm(v))
     if v.shape != (3,) or not length > 0:
         raise InputError(
@@ -45,7 +41,7 @@ class Plane:
     [2.0]
     """
 
-    point: Array = attrs.field(converter=_float64)
+    point: Array = attrs.field(converter=float64)
     normal: Array = attrs.field(converter=_unit)
 
     def distance(self, x: Array) -> tuple[Array, Array, Array]:
@@ -57,7 +53,7 @@ class Plane:
 class Sphere:
     """A ball about `centre` (3,) of `radius` in mm."""
 
-    centre: Array = attrs.field(converter=_float64)
+    centre: Array = attrs.field(converter=float64)
     radius: float
 
     def distance(self, x: Array) -> tuple[Array, Array, Array]:
@@ -75,8 +71,8 @@ class Box:
     Outside it the distance is that of its faces, edges and corners; inside, of the nearest face.
     """
 
-    centre: Array = attrs.field(converter=_float64)
-    half_mm: Array = attrs.field(converter=_float64)
+    centre: Array = attrs.field(converter=float64)
+    half_mm: Array = attrs.field(converter=float64)
 
     def distance(self, x: Array) -> tuple[Array, Array, Array]:
         """Distance (k,) in mm, gradient (k, 3) and second derivative (k, 3, 3), as `Rigid.distance`."""
@@ -117,8 +113,8 @@ class Pose:
     Raises InputError where the matrix is not a rotation (orthogonal, determinant 1).
     """
 
-    rotation: Array = attrs.field(converter=_float64, factory=lambda: np.eye(3))
-    shift: Array = attrs.field(converter=_float64, factory=lambda: np.zeros(3))
+    rotation: Array = attrs.field(converter=float64, factory=lambda: np.eye(3))
+    shift: Array = attrs.field(converter=float64, factory=lambda: np.zeros(3))
 
     def __attrs_post_init__(self) -> None:
         r = self.rotation

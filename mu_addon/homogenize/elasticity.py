@@ -9,7 +9,7 @@ import attrs
 import numpy as np
 from numpy.typing import ArrayLike
 
-from ..arrays import Array
+from ..arrays import Array, float64
 from ..errors import MeshingError
 from ..fem.materials import Materials
 from ..meshing.mesh import Mesh
@@ -25,10 +25,6 @@ _COARSE = 2e-3
 _NORMAL = slice(0, 3)
 
 
-def _tensor(values: ArrayLike) -> Array:
-    return np.ascontiguousarray(values, np.float64)
-
-
 @attrs.frozen(eq=False)
 class Elasticity:
     """Effective elasticity of a lattice with three mirror planes: C (6, 6) in MPa, in Voigt's notation.
@@ -38,7 +34,7 @@ class Elasticity:
     nearest cubic material, means over the axes; `cubic_error` is its relative distance.
     """
 
-    C: Array = attrs.field(converter=_tensor)
+    C: Array = attrs.field(converter=float64)
     relative_density: float = 1.0
 
     @property

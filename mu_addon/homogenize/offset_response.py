@@ -13,12 +13,8 @@ from typing import Any
 import attrs
 import numpy as np
 
-from ..arrays import Array
+from ..arrays import Array, float64
 from ..errors import InputError
-
-
-def _float64(values: Any) -> Array:
-    return np.ascontiguousarray(values, np.float64)
 
 
 @attrs.frozen(eq=False)
@@ -30,9 +26,9 @@ class OffsetResponse:
     or a modulus that is not positive.
     """
 
-    offsets_mm: Array = attrs.field(converter=_float64)
-    modulus: Array = attrs.field(converter=_float64)
-    density: Array = attrs.field(converter=_float64)
+    offsets_mm: Array = attrs.field(converter=float64)
+    modulus: Array = attrs.field(converter=float64)
+    density: Array = attrs.field(converter=float64)
 
     def __attrs_post_init__(self) -> None:
         if len(self.offsets_mm) < 4 or not (np.diff(self.offsets_mm) > 0).all():

@@ -2,17 +2,11 @@
 
 from __future__ import annotations
 
-from typing import Any
-
 import attrs
 import numpy as np
 
-from ..arrays import Array
+from ..arrays import Array, float64
 from ..errors import InputError
-
-
-def _float64(values: Any) -> Array:
-    return np.ascontiguousarray(values, np.float64)
 
 
 @attrs.frozen(eq=False)
@@ -24,9 +18,9 @@ class Curve:
     stretches do not ascend.
     """
 
-    stretch: Array = attrs.field(converter=_float64)
-    stress_MPa: Array = attrs.field(converter=_float64)
-    lateral: Array = attrs.field(converter=_float64)
+    stretch: Array = attrs.field(converter=float64)
+    stress_MPa: Array = attrs.field(converter=float64)
+    lateral: Array = attrs.field(converter=float64)
 
     def __attrs_post_init__(self) -> None:
         k = len(self.stretch)

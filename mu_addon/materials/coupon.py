@@ -11,7 +11,7 @@ from typing import Any
 import attrs
 import numpy as np
 
-from ..arrays import Array
+from ..arrays import Array, float64
 from ..design.quantity import in_MPa
 from ..errors import ConvergenceError, InputError
 from ..fem.law_at_points import evaluate
@@ -23,10 +23,6 @@ _FREE = {"uniaxial": (1, 2), "equibiaxial": (2,), "pure_shear": (2,)}
 # Lateral stress taken as zero, as a share of the shear and bulk modulus together.
 TOLERANCE = 1e-12
 _DIAGONAL = np.array([0, 4, 8])
-
-
-def _float64(values: Any) -> Array:
-    return np.ascontiguousarray(values, np.float64)
 
 
 @attrs.frozen(eq=False)
@@ -47,8 +43,8 @@ class Coupon:
 
     name: str
     mode: str = attrs.field(validator=attrs.validators.in_(MODES))
-    stretch: Array = attrs.field(converter=_float64)
-    stress_MPa: Array = attrs.field(converter=_float64)
+    stretch: Array = attrs.field(converter=float64)
+    stress_MPa: Array = attrs.field(converter=float64)
 
     def __attrs_post_init__(self) -> None:
         if self.stretch.shape != self.stress_MPa.shape or self.stretch.ndim != 1:

@@ -20,7 +20,7 @@ from ..errors import InputError
 from ..fem import laws
 from ..reading import text_in
 from ..toml_reader import TomlTable, parsed_toml
-from ..toml_writer import toml_value
+from ..toml_writer import toml_text, toml_value
 from .coupon import MODES
 from .law_forms import with_bulk
 from .stability import Stability, check_stability, whole_ranges
@@ -299,44 +299,26 @@ def _ranges(table: TomlTable) -> dict[str, tuple[float, float]]:
 
 def material_text(material: Material, head: str = "") -> str:
     """A material as TOML text, below the lines of `head` as comments; floats keep every digit."""
-    lines = [f"# {line}".rstrip() for line in head.splitlines()]
-    lines += [f"format = {FORMAT}", f"name = {toml_value(material.name)}"]
-    if material.about:
-        lines.append(f"about = {toml_value(material.about)}")
-    for value in material.values.values():
-        lines += ["", f"[{value.name}]", f"value = {value.value!r}"]
-        lines += [
-            f"{key} = {bound!r}"
-            for key, bound in (("low", value.low), ("high", value.high))
-            if bound is not None
-        ]
-        lines += [f"unit = {toml_value(value.unit)}"]
-        lines += [f"confidence = {toml_value(value.confidence)}", f"source = {toml_value(value.source)}"]
+    figures = {v.name: {key: getattr(v, key) for key in _VALUE} for v in material.values.values()}
+    about = material.about or None
+    text = toml_text({"format": FORMAT, "name": material.name, "about": about, **figures}, head)
     for point in material.points:
-        lines += ["", "[[point]]", f"mode = {toml_value(point.mode)}", f"strain = {point.strain!r}"]
-        lines += [f"stress_MPa = {point.stress_MPa!r}", f"confidence = {toml_value(point.confidence)}"]
-        lines += [f"source = {toml_value(point.source)}"]
-    row = dict(zip(material.law.parameter_names, material.parameters.tolist(), strict=True))
-    lines += ["", "[law]", f"name = {toml_value(material.law.name)}"]
-    tables = [("parameters", row), ("low95", material.low95), ("high95", material.high95)]
-    lines += [
-        f"{key} = {toml_value({name: float(value) for name, value in table.items()})}"
-        for key, table in tables
-        if table
-    ]
-    lines += [
-        f"confidence = {toml_value(material.law_confidence)}",
-        f"source = {toml_value(material.law_source)}",
-    ]
-    lines += [f"ranges = {toml_value(material.ranges)}"]
-    if material.fails:
-        lines += [f"fails = {toml_value(material.fails)}"]
-    wall = [name for name in material.wall.names if name in _WALL]
+        text += "\n[[point]]\n" + toml_text({key: getattr(point, key) for key in _POINT})
+    law = {
+        "name": material.law.name,
+        "parameters": dict(zip(material.law.parameter_names, material.parameters.tolist(), strict=True)),
+        "low95": material.low95,
+        "high95": material.high95,
+        "confidence": material.law_confidence,
+        "source": material.law_source,
+        "ranges": material.ranges,
+        "fails": material.fails,
+    }
+    # Its tables stand on one line each.
+    lines = [f"{key} = {toml_value(value)}\n" for key, value in law.items() if value not in ({}, ())]
+    text += "\n[law]\n" + "".join(lines)
+    wall = {name: getattr(material.wall, name) for name in material.wall.names if name in _WALL}
     if wall:
-        lines += ["", "[wall]"]
-        for name in wall:
-            value = getattr(material.wall, name)
-            lines.append(f"{name} = {toml_value(value)}")
-        lines += [f"confidence = {toml_value(material.wall_confidence)}"]
-        lines += [f"source = {toml_value(material.wall_source)}"]
-    return "\n".join(lines) + "\n"
+        wall |= {"confidence": material.wall_confidence, "source": material.wall_source}
+        text += "\n" + toml_text({"wall": wall})
+    return text

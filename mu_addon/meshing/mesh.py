@@ -8,7 +8,7 @@ from typing import Any
 import attrs
 import numpy as np
 
-from ..arrays import Array
+from ..arrays import Array, float64, int32
 from ..errors import MeshingError
 
 MEMBRANE, LATTICE = 1, 2
@@ -22,14 +22,6 @@ TRIANGLE_EDGES = np.array([[0, 1], [1, 2], [2, 0]])
 # A reflection turns an element inside out; exchanging its first two corners turns it back.
 FLIPPED_TET = np.array([1, 0, 2, 3, 4, 6, 5, 8, 7, 9])
 FLIPPED_TRIANGLE = np.array([1, 0, 2, 3, 5, 4])
-
-
-def _float64(array: Any) -> Array:
-    return np.ascontiguousarray(array, np.float64)
-
-
-def _int32(array: Any) -> Array:
-    return np.ascontiguousarray(array, np.int32)
 
 
 def _int8(array: Any) -> Array:
@@ -58,24 +50,24 @@ class Mesh:
     volume at each quadrature point that lies in a beam and has its stiffness there.
     """
 
-    nodes: Array = attrs.field(converter=_float64)
-    tets: Array = attrs.field(converter=_int32)
+    nodes: Array = attrs.field(converter=float64)
+    tets: Array = attrs.field(converter=int32)
     region: Array = attrs.field(converter=_int8)
-    cavity: Array = attrs.field(converter=_int32)
-    base: Array = attrs.field(converter=_int32)
-    tip: Array = attrs.field(converter=_int32)
+    cavity: Array = attrs.field(converter=int32)
+    base: Array = attrs.field(converter=int32)
+    tip: Array = attrs.field(converter=int32)
     symmetry: tuple[str, ...] = ()
-    filled: Array = attrs.field(factory=lambda: np.zeros((0, 0)), converter=_float64)
-    tied: Array = attrs.field(factory=lambda: np.zeros(0), converter=_int32)
-    tied_to: Array = attrs.field(factory=lambda: np.zeros((0, 0)), converter=_int32)
-    tied_weights: Array = attrs.field(factory=lambda: np.zeros((0, 0)), converter=_float64)
-    beams: Array = attrs.field(factory=lambda: np.zeros((0, 4)), converter=_int32)
-    flexible: Array = attrs.field(factory=lambda: np.zeros((0, 6)), converter=_float64)
-    beam_of: Array = attrs.field(factory=lambda: np.zeros(0), converter=_int32)
-    carried: Array = attrs.field(factory=lambda: np.zeros(0), converter=_int32)
-    carriers: Array = attrs.field(factory=lambda: np.zeros((0, 4)), converter=_int32)
-    shares: Array = attrs.field(factory=lambda: np.zeros(0), converter=_float64)
-    in_beams: Array = attrs.field(factory=lambda: np.zeros((0, 0)), converter=_float64)
+    filled: Array = attrs.field(factory=lambda: np.zeros((0, 0)), converter=float64)
+    tied: Array = attrs.field(factory=lambda: np.zeros(0), converter=int32)
+    tied_to: Array = attrs.field(factory=lambda: np.zeros((0, 0)), converter=int32)
+    tied_weights: Array = attrs.field(factory=lambda: np.zeros((0, 0)), converter=float64)
+    beams: Array = attrs.field(factory=lambda: np.zeros((0, 4)), converter=int32)
+    flexible: Array = attrs.field(factory=lambda: np.zeros((0, 6)), converter=float64)
+    beam_of: Array = attrs.field(factory=lambda: np.zeros(0), converter=int32)
+    carried: Array = attrs.field(factory=lambda: np.zeros(0), converter=int32)
+    carriers: Array = attrs.field(factory=lambda: np.zeros((0, 4)), converter=int32)
+    shares: Array = attrs.field(factory=lambda: np.zeros(0), converter=float64)
+    in_beams: Array = attrs.field(factory=lambda: np.zeros((0, 0)), converter=float64)
 
     @property
     def resolved(self) -> bool:
