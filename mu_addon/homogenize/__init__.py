@@ -33,6 +33,6 @@ if TYPE_CHECKING:
     from .foam_fit import FoamFit, fit_foam, lattice_law
     from .specimen import Specimen, block_specimen
     from .stress_strain_curve import DEFAULT, Curve, moduli
-    from .stretch import Stretched, StretchSettings, stretch_lattice
+    from .stretch import Stretched, stretch_lattice
 else:
     __getattr__, __dir__, __all__ = public_face(__name__)

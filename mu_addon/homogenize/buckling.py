@@ -59,15 +59,13 @@ class Loss:
 class SymmetryBreakingModes:
     """The small motions of a specimen's eighth in the seven parts that break its symmetry.
 
-    held (n, 3) bool: the supports on the plates. threads, mean_dilatation: as `Model` has them.
+    held (n, 3) bool: the supports on the plates. threads: as `Model` has them.
     """
 
-    def __init__(
-        self, specimen: Specimen, held: Array, threads: int = 2, mean_dilatation: bool = False
-    ) -> None:
+    def __init__(self, specimen: Specimen, held: Array, threads: int = 2) -> None:
         self.mesh = attrs.evolve(specimen.mesh, symmetry=())
         self.held = held
-        self.model = Model(self.mesh, threads=threads, mean_dilatation=mean_dilatation)
+        self.model = Model(self.mesh, threads=threads)
         self.parameters = self.model.parameters(specimen.materials)
         # The one lost last is tested first.
         self._order = list(_BREAKING)

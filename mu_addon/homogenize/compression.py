@@ -124,7 +124,6 @@ def compress(
     friction: Friction = "slide",
     *,
     threads: int = 2,
-    mean_dilatation: bool = False,
     stability: bool = True,
 ) -> Compression:
     """Equilibria at nominal strains in ascending order, compression positive, of a specimen between plates.
@@ -140,7 +139,7 @@ def compress(
         raise InputError(
             f"nominal strains {strains}", "compression test", "give them in ascending order between 0 and 1"
         )
-    plates = Plates(specimen, friction, threads, mean_dilatation)
+    plates = Plates(specimen, friction, threads)
     reached: list[Reached] = []
     for strain in strains:
         reached.append(plates.reached(strain, reached))
@@ -148,7 +147,7 @@ def compress(
             break
     # Its factor makes room for others.
     del plates
-    limits = limits_of(specimen, friction, reached, threads, mean_dilatation, stability)
+    limits = limits_of(specimen, friction, reached, threads, stability)
     return compression_of(specimen, friction, reached, limits)
 
 
@@ -166,7 +165,6 @@ def limits_of(
     friction: Friction,
     reached: Sequence[Reached],
     threads: int = 2,
-    mean_dilatation: bool = False,
     stability: bool = True,
 ) -> Limits:
     """Where struts meet, and with `stability` where the block buckles, on a path of states."""
@@ -176,7 +174,7 @@ def limits_of(
     if stability:
         # Only what comes before is of interest.
         count = len(states) if touch is None else int(np.searchsorted(strains, touch.strain)) + 1
-        motions = SymmetryBreakingModes(specimen, _held(specimen, friction), threads, mean_dilatation)
+        motions = SymmetryBreakingModes(specimen, _held(specimen, friction), threads)
         loss = first_loss(motions, strains[:count], moves[:count])
     return Limits(touch, loss)
 
@@ -206,15 +204,11 @@ class Plates:
     friction: "slide" or "stick". Raises InputError for another one.
     """
 
-    def __init__(
-        self, specimen: Specimen, friction: Friction, threads: int = 2, mean_dilatation: bool = False
-    ) -> None:
+    def __init__(self, specimen: Specimen, friction: Friction, threads: int = 2) -> None:
         mesh = specimen.mesh
         self.specimen = specimen
         held = _held(specimen, friction)
-        self.equilibrium = Equilibrium(
-            Model(mesh, held, threads=threads, mean_dilatation=mean_dilatation), specimen.materials
-        )
+        self.equilibrium = Equilibrium(Model(mesh, held, threads=threads), specimen.materials)
         self.rest = Compressed(0.0, np.zeros_like(mesh.nodes), 0.0, 0.0)
 
     def reached(self, strain: float, earlier: Sequence[Reached]) -> Reached:

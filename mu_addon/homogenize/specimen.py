@@ -25,29 +25,24 @@ class Specimen:
     materials: Materials
 
 
-def block_specimen(octant: Mesh, cells: int, materials: Materials, axis: str = "z") -> Specimen:
+def block_specimen(octant: Mesh, cells: int, materials: Materials) -> Specimen:
     """One eighth of a block of cells^3 cells, for `compress`, made of copies of an eighth of one cell.
 
     octant: mesh of [0, U/2]^3 mm with a corner of the cell at the origin, and materials: those of the octant.
-    The block's outer faces are faces of cells, cut flat. axis: axis of the cell that the plates compress; the
-    specimen is turned so that it becomes z. Laws must be isotropic, since copies are mirror images. Raises
-    InputError for less than one cell, an unknown axis or an octant that is not cubic.
+    The block's outer faces are faces of cells, cut flat. Laws must be isotropic, since copies are mirror
+    images. Raises InputError for less than one cell or an octant that is not cubic.
     """
     if cells < 1 or cells != int(cells):
         raise InputError(f"a specimen of {cells} cells", "compression test", "ask for 1 cell or more")
-    if axis not in AXES:
-        raise InputError(f"no axis {axis!r} to compress along", "compression test", "choose x, y or z")
     box = box_of(octant)
     if not np.allclose(box, box[0], rtol=1e-12):
         raise InputError(f"the octant of a cell is {box} mm", "compression test", "give that of a cubic cell")
-    # A cyclic exchange of axes is a rotation; it keeps elements the right way round.
-    turned = np.roll(octant.nodes, 2 - AXES.index(axis), axis=1)
-    tets = octant.tets
+    nodes, tets = octant.nodes, octant.tets
     if cells % 2:
         # The middle of an odd block is the middle of a cell, of an even one a corner.
-        turned = box[0] - turned
+        nodes = box[0] - nodes
         tets = tets[:, FLIPPED_TET[: tets.shape[1]]]
-    piece = attrs.evolve(octant, nodes=turned, tets=tets, cavity=octant.cavity[:0], symmetry=())
+    piece = attrs.evolve(octant, nodes=nodes, tets=tets)
     mesh = tiled(piece, (cells,) * 3, (box[0],) * 3, symmetry=AXES)
     mesh = attrs.evolve(mesh, base=mesh.base[:0])
     return Specimen(mesh, int(cells), 2 * cells * box[0], repeated(materials, len(tets), cells**3))

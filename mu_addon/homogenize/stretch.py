@@ -1,4 +1,4 @@
-"""A periodic lattice stretched along one axis at finite strain, by an eighth of its cell."""
+"""A periodic lattice stretched along an axis at finite strain, by an eighth of its cell."""
 
 from __future__ import annotations
 
@@ -14,35 +14,20 @@ from ..fem.factor import IndefiniteError
 from ..fem.materials import Materials
 from ..fem.self_intersection import crossings
 from ..meshing.mesh import AXES, Mesh
+from .buckling import interpolated
 from .octant import Octant, require_factor
 from .stress_strain_curve import Curve
 
+# Of the residual over the root sum of squares of all element forces.
+_TOLERANCE = 1e-9
+_MOST_ITERATIONS, _MOST_BACKTRACKS = 30, 8
+_SMALLEST_STEP = 1e-3
+# How far from its prediction a state may lie, as a share of the predicted move.
+_FROM_PREDICTION = 0.5
+# Shares of the undeformed tangent that make an indefinite one definite.
+_REGULARISATION = (0.0, 0.03, 0.3, 3.0, 30.0)
 # How far a node may lie beyond the mirror plane it should stay behind, as a share of the cell.
 _TOUCH = 1e-6
-
-
-@attrs.frozen
-class StretchSettings:
-    """Settings of a virtual test of a periodic lattice.
-
-    axis: of the stretch, "x", "y" or "z". strains: nominal, at which points are kept; rest is always one.
-    tolerance: residual over the root sum of squares of all element forces; min_step: least step of strain;
-    predictor_tolerance: how far from its prediction a state may lie, as a share of the predicted move. Raises
-    InputError for strains not above -1.
-    """
-
-    axis: str = attrs.field(default="z", validator=attrs.validators.in_(AXES))
-    strains: tuple[float, ...] = tuple(float(s) for s in np.linspace(-0.4, 0.4, 41).round(12))
-    tolerance: float = 1e-9
-    max_iterations: int = 30
-    min_step: float = 1e-3
-    max_backtracks: int = 8
-    predictor_tolerance: float = 0.5
-    regularisation: tuple[float, ...] = (0.03, 0.3, 3.0, 30.0)
-
-    def __attrs_post_init__(self) -> None:
-        if not len(self.strains) or min(self.strains) <= -1.0 or not np.isfinite(self.strains).all():
-            raise InputError("no strains above -1 are asked for", "stretch", "give strains as -0.4 or 0.2")
 
 
 @attrs.frozen(eq=False)
@@ -75,37 +60,34 @@ class Stretched:
 def stretch_lattice(
     mesh: Mesh,
     materials: Materials,
-    settings: StretchSettings | None = None,
+    strains: Sequence[float],
     on_point: Callable[[Point], None] | None = None,
 ) -> Stretched:
-    """Uniaxial tension and compression of a periodic lattice at finite strain, by one eighth of its cell.
+    """Tension and compression along z of a periodic lattice at nominal strains, by one eighth of its cell.
 
-    mesh: the eighth, from 0 on; its sides stay plane, as the lattice's mirror planes demand, and a lattice
-    that would buckle away from them does not. The curve ends where no stable equilibrium is found or walls
-    meet; `stopped` gives the reason. on_point: called with each `Point`. Raises MeshingError where the
-    undeformed cell is unstable.
+    Points are kept at the strains and at rest. mesh: the eighth, from 0 on; its sides stay plane, as the
+    lattice's mirror planes demand, and a lattice that would buckle away from them does not. The curve ends
+    where no stable equilibrium is found or walls meet; `stopped` gives the reason. on_point: called with each
+    `Point`. Raises InputError for strains not above -1, and MeshingError where the undeformed cell is
+    unstable.
     """
-    return Stretching(mesh, materials, settings).run(on_point)
+    if not len(strains) or min(strains) <= -1.0 or not np.isfinite(strains).all():
+        raise InputError("no strains above -1 are asked for", "stretch", "give strains as -0.4 or 0.2")
+    return Stretching(mesh, materials).run(strains, on_point)
 
 
 class Stretching:
-    """A periodic lattice under prescribed stretch along one axis; arguments as `stretch_lattice`.
+    """A periodic lattice under prescribed stretch along z; arguments as `stretch_lattice`.
 
     Raises MeshingError where the undeformed cell is unstable.
     """
 
-    def __init__(
-        self,
-        mesh: Mesh,
-        materials: Materials,
-        settings: StretchSettings | None = None,
-    ) -> None:
-        self.settings = settings or StretchSettings()
+    def __init__(self, mesh: Mesh, materials: Materials) -> None:
         self.octant = Octant(mesh, materials)
-        self.axis = AXES.index(self.settings.axis)
-        self.lateral = tuple(k for k in range(3) if k != self.axis)
         self._part = self.octant.stretching
         self._affine = np.stack([self.octant.affine(np.diag(e)) for e in np.eye(3)], axis=1)
+        # Of the two lateral stretches.
+        self._along = self._affine[:, (0, 1)]
         self._rest = self.octant.tangent(np.zeros_like(mesh.nodes))[0]
         require_factor(self._part, self._rest)
 
@@ -114,21 +96,21 @@ class Stretching:
         """The undeformed lattice, at strain and stress 0."""
         return Point(0.0, np.ones(3), np.zeros(3), np.zeros_like(self.octant.mesh.nodes))
 
-    def run(self, on_point: Callable[[Point], None] | None = None) -> Stretched:
+    def run(self, strains: Sequence[float], on_point: Callable[[Point], None] | None = None) -> Stretched:
         """The test from rest to the largest strain on either side; on_point is called with each `Point`."""
         rest = self.rest
-        wanted = sorted(set(self.settings.strains) - {0.0})
-        compressed, why_compressed = self._along([s for s in wanted if s < 0][::-1], rest, on_point)
-        pulled, why_pulled = self._along([s for s in wanted if s > 0], rest, on_point)
+        wanted = sorted(set(strains) - {0.0})
+        compressed, why_compressed = self._side([s for s in wanted if s < 0][::-1], rest, on_point)
+        pulled, why_pulled = self._side([s for s in wanted if s > 0], rest, on_point)
         points = (*compressed[::-1], rest, *pulled)
         curve = Curve(
-            [p.stretch[self.axis] for p in points],
-            [p.stress_MPa[self.axis] for p in points],
-            [p.stretch[list(self.lateral)] for p in points],
+            [p.stretch[2] for p in points],
+            [p.stress_MPa[2] for p in points],
+            [p.stretch[:2] for p in points],
         )
         return Stretched(curve, points, "; ".join(w for w in (why_compressed, why_pulled) if w))
 
-    def _along(
+    def _side(
         self, strains: Sequence[float], rest: Point, on_point: Callable[[Point], None] | None
     ) -> tuple[list[Point], str]:
         """Points at strains farther and farther from rest, and why they end early, or ""."""
@@ -152,7 +134,6 @@ class Stretching:
 
         Raises ConvergenceError naming strain and cause where the smallest step fails.
         """
-        s = self.settings
         path = list(history)
         step = strain - path[-1].strain
         while path[-1].strain != strain:
@@ -161,10 +142,10 @@ class Stretching:
             target = strain if abs(left) <= abs(step) * (1 + 1e-9) else last.strain + step
             try:
                 guess = self.predicted(path[-3:], target)
-                reach = s.predictor_tolerance * max(np.abs(guess[1] - last.u).max(), s.tolerance)
+                reach = _FROM_PREDICTION * max(np.abs(guess[1] - last.u).max(), _TOLERANCE)
                 path.append(self.equilibrium(target, *guess, reach_mm=reach))
             except ConvergenceError as why:
-                if abs(target - last.strain) / 2 < s.min_step:
+                if abs(target - last.strain) / 2 < _SMALLEST_STEP:
                     raise ConvergenceError(
                         f"no equilibrium beyond a strain of {last.strain:.3f}: {why.what}"
                     ) from None
@@ -177,7 +158,6 @@ class Stretching:
         The start's sides must lie where its stretches put them. Raises ConvergenceError where elements
         invert, progress stops, the state is unstable, or lies farther from the start than `reach_mm`.
         """
-        s, lateral = self.settings, list(self.lateral)
         start = u
         energy = self._energy(u)
         if not np.isfinite(energy):
@@ -185,8 +165,8 @@ class Stretching:
         force, level = self._out_of_balance(u)
         levels = [level]
         definite = False
-        for _ in range(s.max_iterations):
-            if level <= s.tolerance:
+        for _ in range(_MOST_ITERATIONS):
+            if level <= _TOLERANCE:
                 if np.abs(u - start).max() > reach_mm:
                     raise ConvergenceError(
                         "the lattice snaps to a distant equilibrium (limit point or buckling)"
@@ -199,7 +179,7 @@ class Stretching:
             definite, change, du = self._step(u, force)
             slope = float(force @ du.ravel())
             length = 1.0
-            for _ in range(s.max_backtracks):
+            for _ in range(_MOST_BACKTRACKS):
                 trial = u + length * du
                 force_there, level_there = self._out_of_balance(trial)
                 # Near the solution the energy's change drowns in rounding.
@@ -216,10 +196,10 @@ class Stretching:
             else:
                 raise ConvergenceError("the line search found no lower energy")
             stretch = stretch.copy()
-            stretch[lateral] += length * change
+            stretch[:2] += length * change
             u, force, level = trial, force_there, level_there
             levels.append(level)
-        raise ConvergenceError(f"no convergence in {s.max_iterations} iterations")
+        raise ConvergenceError(f"no convergence in {_MOST_ITERATIONS} iterations")
 
     def predicted(self, history: Sequence[Point], strain: float) -> tuple[Array, Array]:
         """Stretches (3,) and displacement (n, 3) in mm to start from at another strain.
@@ -233,26 +213,19 @@ class Stretching:
             if not definite:
                 raise ConvergenceError("the state to start from is unstable")
             change = np.zeros(3)
-            change[self.axis] = strain - last.strain
+            change[2] = strain - last.strain
             _, K = self.octant.tangent(last.u)
             pushed = K @ (self._affine @ change)
-            lateral = np.linalg.solve(
-                complement, solved.T @ pushed - self._affine[:, self.lateral].T @ pushed
-            )
-            change[list(self.lateral)] = lateral
+            lateral = np.linalg.solve(complement, solved.T @ pushed - self._along.T @ pushed)
+            change[:2] = lateral
             du = self._part.solve(-pushed) - solved @ lateral + self._affine @ change
             return last.stretch + change, last.u + du.reshape(last.u.shape)
-        stretch, u = np.zeros(3), np.zeros_like(last.u)
-        for a in history:
-            weight = 1.0
-            for b in history:
-                if a is not b:
-                    weight *= (strain - b.strain) / (a.strain - b.strain)
-            stretch += weight * a.stretch
-            u += weight * a.u
+        strains = [point.strain for point in history]
+        stretch = interpolated(strains, [point.stretch for point in history], strain)
+        u = interpolated(strains, [point.u for point in history], strain)
         # Rounding must not move it, nor the sides off the planes they are on.
-        stretch[self.axis] = 1.0 + strain
-        return stretch, self._on_planes(stretch, u)
+        stretch[2] = 1.0 + strain
+        return stretch, np.where(self.octant.across, self.octant.mesh.nodes * (stretch - 1.0), u)
 
     def _energy(self, u: Array) -> float:
         return self.octant.model.potential(u, 0.0, self.octant.parameters)
@@ -262,7 +235,7 @@ class Stretching:
         octant = self.octant
         force = octant.model.residual(u, 0.0, octant.parameters).ravel()
         # The mean force on a side, which a stretch's energy changes by.
-        mean = force @ self._affine[:, self.lateral] / octant.box[list(self.lateral)]
+        mean = force @ self._along / octant.box[:2]
         level = np.hypot(np.linalg.norm(force[self._part.free]), np.linalg.norm(mean))
         return force, float(level / octant.model.force_scale())
 
@@ -274,14 +247,13 @@ class Stretching:
         """
         octant, part = self.octant, self._part
         at, _ = octant.tangent(u)
-        along = self._affine[:, self.lateral]
-        for share in (0.0, *self.settings.regularisation):
+        for share in _REGULARISATION:
             values = at + share * self._rest if share else at
             try:
                 part.factorise(values)
-                coupling = octant.model.matrix(values) @ along
+                coupling = octant.model.matrix(values) @ self._along
                 solved = part.solve(coupling)
-                complement = along.T @ coupling - coupling.T @ solved
+                complement = self._along.T @ coupling - coupling.T @ solved
                 np.linalg.cholesky(complement)
             except (IndefiniteError, np.linalg.LinAlgError):
                 continue
@@ -290,16 +262,12 @@ class Stretching:
 
     def _step(self, u: Array, force: Array) -> tuple[bool, Array, Array]:
         """Newton's step: True if the tangent was definite, change of the lateral stretches, and of u."""
-        along = self._affine[:, self.lateral]
         definite, solved, complement = self._factorised(u)
         inner = self._part.solve(-force)
         # The forces on the unknowns reach the stretches through the coupling that was solved for.
-        change = np.linalg.solve(complement, -(force @ along) + force @ solved)
-        du = inner - solved @ change + along @ change
+        change = np.linalg.solve(complement, -(force @ self._along) + force @ solved)
+        du = inner - solved @ change + self._along @ change
         return definite, change, du.reshape(u.shape)
-
-    def _on_planes(self, stretch: Array, u: Array) -> Array:
-        return np.where(self.octant.across, self.octant.mesh.nodes * (stretch - 1.0), u)
 
     def _first_contact(self, path: Sequence[Point]) -> str:
         """Position on a path, straight between states, where walls first meet, as text; "" if nowhere."""

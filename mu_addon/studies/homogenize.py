@@ -196,10 +196,9 @@ class Homogenize(Study):
         self, mesh: meshing.Mesh, filled: fem.Materials, stretches: tuple[float, ...], tell: Tell
     ) -> homogenize.Stretched:
         """Tension and compression of the infinite lattice along an axis, without the states themselves."""
-        settings = homogenize.StretchSettings(strains=stretches)
         done = iter(range(1, len(stretches) + 1))
         found = homogenize.stretch_lattice(
-            mesh, filled, settings=settings, on_point=lambda _: tell(next(done) / len(stretches))
+            mesh, filled, stretches, lambda _: tell(next(done) / len(stretches))
         )
         return attrs.evolve(found, points=())
 

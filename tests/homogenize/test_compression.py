@@ -45,8 +45,8 @@ def resin(mesh, poisson=NU):
     return bodies.uniform(mesh, E, poisson)
 
 
-def block(octant, cells, axis="z", poisson=NU):
-    return block_specimen(octant, cells, resin(octant, poisson), axis)
+def block(octant, cells, poisson=NU):
+    return block_specimen(octant, cells, resin(octant, poisson))
 
 
 def initial(octant, cells, friction, **how):
@@ -167,24 +167,6 @@ def test_corners_of_cells_stand_on_the_plates_and_at_the_outer_faces(cells):
     assert volumes.sum() == pytest.approx(cells**3 * element_volumes(octant).sum(), rel=1e-12)
 
 
-@pytest.mark.parametrize("axis", AXES)
-def test_compression_along_another_axis_is_that_of_the_turned_cell(axis):
-    sizes = {"x": 0.75, "y": 0.5, "z": 0.25}
-    octant = piece(
-        (4, 4, 4), (U / 2,) * 3, lambda c: (c < np.array(list(sizes.values())) * U / 2).any(axis=1)
-    )
-    order = [(AXES.index(axis) + k) % 3 for k in (1, 2, 0)]
-    turned = piece(
-        (4, 4, 4), (U / 2,) * 3, lambda c: (c < np.array(list(sizes.values()))[order] * U / 2).any(axis=1)
-    )
-    along, same = (
-        compress(block(o, 1, a), [0.01]).states[-1].force_N for o, a in ((octant, axis), (turned, "z"))
-    )
-    assert along == pytest.approx(same, rel=1e-9)
-    # The thicker the walls across it, the softer the axis: fewer of them are along it.
-    assert (along > compress(block(octant, 1, "x"), [0.01]).states[-1].force_N) == (axis != "x")
-
-
 def test_materials_go_with_their_elements():
     octant = walls()
     moduli_MPa = np.linspace(1.0, 2.0, len(octant.tets))
@@ -299,8 +281,6 @@ def test_what_cannot_be_tested_is_named():
     for cells in (0, -1, 1.5):
         with pytest.raises(InputError, match="cells"):
             block(octant, cells)
-    with pytest.raises(InputError, match="axis"):
-        block(octant, 1, "w")
     with pytest.raises(InputError, match="cubic"):
         block(piece((1, 1, 1), (1.0, 1.0, 2.0)), 1)
     body = block(octant, 1)
