@@ -42,9 +42,7 @@ QUALITY = {"interactive": Facets(64, 6, 12, 4), "export": Facets(192, 16, 32, 10
 class Solid:
     """A printable surface: vertices (n, 3) in mm, triangles (m, 3) facing outward, and the gates it passed.
 
-    window: of its waveguide, None without one and for a path of nodes; bar: its waveguide. taken_off:
-    distance in mm, in the plane and along z, by which every surface was moved inward to compensate the print
-    offset.
+    window: of its waveguide, None without one and for a path of nodes; bar: its waveguide.
     """
 
     vertices: Vertices
@@ -53,7 +51,6 @@ class Solid:
     window: Window | None
     quality: str
     bar: Bar | None = None
-    taken_off: tuple[float, float] = (0.0, 0.0)
 
     @property
     def volume_mm3(self) -> float:
@@ -134,7 +131,7 @@ def build_solid(
         guide=guide,
     )
     window = path if isinstance(path, Window) else None
-    return Solid(vertices, triangles, gates, window, quality, bar, take_off)
+    return Solid(vertices, triangles, gates, window, quality, bar)
 
 
 def chamber(unit: Unit) -> tuple[Vertices, Triangles]:

@@ -12,19 +12,10 @@ from ..errors import InputError
 
 @attrs.frozen
 class Moduli:
-    """Bulk and shear modulus in MPa of an isotropic material.
-
-    >>> round(Moduli(bulk=1.0, shear=0.6).young, 6)
-    1.5
-    """
+    """Bulk and shear modulus in MPa of an isotropic material."""
 
     bulk: float
     shear: float
-
-    @property
-    def young(self) -> float:
-        """Young's modulus in MPa, 9 K G/(3 K + G); 0 without a shear modulus."""
-        return 9 * self.bulk * self.shear / (3 * self.bulk + self.shear) if self.shear else 0.0
 
 
 def hashin_shtrikman(shares: ArrayLike, bulk: ArrayLike, shear: ArrayLike) -> tuple[Moduli, Moduli]:

@@ -109,10 +109,6 @@ class Elasticity:
         """Poisson's ratio under stress along a cell's edge, across to another edge."""
         return self.C12 / (self.C11 + self.C12)
 
-    def young_modulus(self, directions: ArrayLike) -> Array:
-        """Young's modulus (k,) in MPa along directions (k, 3) of any length, of the full tensor C."""
-        return young_modulus(self.C, directions)
-
 
 def young_modulus(C: Array, directions: ArrayLike) -> Array:
     """Young's modulus (k,) in MPa of an elasticity tensor along directions (k, 3) of any length.

@@ -58,8 +58,7 @@ class FoamFit:
     """A foam, a cubic shear and a diagonal stretch in parallel, and how well they fit a cell.
 
     parameters (6,): as Foam names them; shear_MPa and diagonal_MPa: G and C of the others. stretch: the range
-    of the curve; one_modulus: whether tension and compression share theirs, so that the tangent is continuous
-    at rest; E_MPa, poisson and C44_MPa: the law's own at small strain along an axis, and cell_E_MPa,
+    of the curve; E_MPa, poisson and C44_MPa: the law's own at small strain along an axis, and cell_E_MPa,
     cell_poisson and cell_C44_MPa the cell's; stable_shear and stable_pressed: the simple shear between two
     axes, and the strain on all sides (compression positive), up to which no band of localised strain can
     form.
@@ -70,7 +69,6 @@ class FoamFit:
     diagonal_MPa: float
     stretch: tuple[float, float]
     misfit: Misfit
-    one_modulus: bool
     E_MPa: float
     poisson: float
     C44_MPa: float
@@ -142,7 +140,6 @@ def fit_foam(curve: Curve, C11_MPa: float, C12_MPa: float, C44_MPa: float) -> Fo
         axial,
         (low, high),
         misfit(curve, parameters, axial),
-        one_modulus,
         E,
         poisson,
         C44,

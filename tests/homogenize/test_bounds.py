@@ -64,7 +64,6 @@ def test_they_come_in_order(phases):
 def test_one_phase_is_itself(bulk, shear):
     for found in (*hashin_shtrikman([0.4, 0.6], [bulk] * 2, [shear] * 2), voigt([1], [bulk], [shear])):
         assert (found.bulk, found.shear) == pytest.approx((bulk, shear))
-        assert found.young == pytest.approx(9 * bulk * shear / (3 * bulk + shear))
 
 
 def test_what_is_no_mixture_is_refused():

@@ -12,7 +12,7 @@ from mu_addon.homogenize.foam_fit import FoamFit, Misfit
 def test_a_fit_becomes_a_file_that_says_where_it_is_from():
     row = np.array([0.006, 5.0, 0.006, 4.0, 0.0, 1.0])
     small = 0.018, 0.45, 0.056
-    fit = FoamFit(row, 0.05, 0.06, (0.6, 1.4), Misfit(0.01, 0.02, 0.03), True, *small, *small, 0.1, 0.03)
+    fit = FoamFit(row, 0.05, 0.06, (0.6, 1.4), Misfit(0.01, 0.02, 0.03), *small, *small, 0.1, 0.03)
     C = np.diag([0.072] * 3 + [0.056] * 3)
     C[:3, :3] += 0.06 * (1 - np.eye(3))
     tensor = Elasticity(C, 0.2)

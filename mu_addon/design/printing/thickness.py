@@ -6,7 +6,6 @@ from typing import Any
 
 import attrs
 import numpy as np
-from numpy.typing import NDArray
 
 from ...arrays import Array
 from ..surface import Triangles, Vertices
@@ -17,11 +16,10 @@ START = 1e-3
 
 @attrs.frozen(eq=False)
 class Samples:
-    """Points (s, 3) in mm on a surface, outward unit normals (s, 3), triangles (s,), areas (s,) in mm2."""
+    """Points (s, 3) in mm on a surface, outward unit normals (s, 3), areas (s,) in mm2."""
 
     points: Array
     normals: Array
-    triangle: NDArray[np.int64]
     area: Array
 
 
@@ -56,7 +54,7 @@ def samples(vertices: Vertices, triangles: Triangles, spacing: float) -> Samples
     s, t = np.where(over, 1.0 - s, s), np.where(over, 1.0 - t, t)
     points = p[owner] + s[:, None] * (q - p)[owner] + t[:, None] * (r - p)[owner]
     area = np.full(len(owner), 0.5 * double.sum() / max(len(owner), 1))
-    return Samples(points, (normal / np.maximum(double, 1e-300)[:, None])[owner], owner, area)
+    return Samples(points, (normal / np.maximum(double, 1e-300)[:, None])[owner], area)
 
 
 def cast_rays(solid: Any, surface: Samples, side: int, reach: float) -> RayHits:
