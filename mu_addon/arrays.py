@@ -1,4 +1,4 @@
-"""The type of a numpy array in signatures, whose shape and unit stand in docstrings, and converters to it."""
+"""Numpy arrays: their type in signatures, converters, and groups of linked things."""
 
 from typing import Any
 
@@ -15,3 +15,12 @@ def float64(values: Any) -> Array:
 def int32(values: Any) -> Array:
     """Values as a contiguous array of whole numbers."""
     return np.ascontiguousarray(values, np.int32)
+
+
+def connected(count: int, one: Array, other: Array) -> Array:
+    """Number (count,), from 0, of each thing's group: `count` things, the links one (k,) to other (k,)."""
+    from scipy.sparse import coo_matrix
+    from scipy.sparse.csgraph import connected_components
+
+    links = coo_matrix((np.ones(len(one), bool), (one, other)), shape=(count, count))
+    return np.asarray(connected_components(links, directed=False)[1])

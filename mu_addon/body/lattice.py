@@ -19,10 +19,10 @@ from ..design.parameters import Unit
 from ..design.profile import outer_polygon, outer_radius, outer_slope
 from ..design.solid import QUALITY, lattice_solid
 from ..design.strut_cell import StrutCell
+from ..design.surface import winding_number
 from ..fem.elements import even_points, reference_gradients, shape_functions, shape_gradients
 from ..homogenize.cell_mesh import CellMeshSettings, mesh_cell
 from ..meshing.mesh import FLIPPED_TET, TET_FACES, Mesh, mirror
-from ..meshing.surface import winding_number
 from ..meshing.tiling import tiled
 from .graph_axes import graded_about_axes
 from .octants import graded_nodes

@@ -10,7 +10,7 @@ import attrs
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from ..arrays import Array
+from ..arrays import Array, connected
 from ..errors import InputError
 from . import shapes
 from .gates import GateError, of_surface, require
@@ -373,12 +373,8 @@ def _check_paths(cell: StrutCell) -> None:
 
 def _require(cell: StrutCell, n: int, vertices: Vertices, triangles: Triangles) -> None:
     """Raise GateError where a specimen is open, in pieces, or of another genus than its graph."""
-    from scipy.sparse import coo_matrix
-    from scipy.sparse.csgraph import connected_components
-
     links = np.concatenate([triangles[:, [0, 1]], triangles[:, [1, 2]]]).T
-    graph = coo_matrix((np.ones(links.shape[1]), links), shape=(len(vertices),) * 2)
-    pieces = int(connected_components(graph, directed=False)[0])
+    pieces = int(connected(len(vertices), *links).max()) + 1
     cells = np.array(list(product(range(n), repeat=3))) * cell.kind.divisions
     lattice = filled(cell.kind, cells, cell.size_mm, cell.junction_radius_mm, cell.midspan_radius_mm)
     found, wanted = genus(vertices, triangles), lattice.cycles

@@ -7,6 +7,7 @@ from typing import TypeVar
 import numpy as np
 from numpy.typing import NDArray
 
+from ..arrays import Array
 from ..errors import InputError
 
 Vertices = NDArray[np.float64]
@@ -63,6 +64,25 @@ def area(vertices: Vertices, triangles: Triangles) -> float:
     """Area in mm2 of a surface of triangles (m, 3) between vertices (n, 3) in mm."""
     p, q, r = vertices[triangles.T]
     return float(np.linalg.norm(np.cross(q - p, r - p), axis=1).sum() / 2.0)
+
+
+def winding_number(vertices: Array, triangles: Array, points: Array) -> Array:
+    """Winding number (n,) of a closed surface around points (n, 3) in mm: 1 inside, 0 outside.
+
+    The sum of the solid angles of its triangles (f, 3) over 4 pi. Source: Van Oosterom and Strackee,
+    IEEE Trans. Biomed. Eng. BME-30 (1983) 125.
+    """
+    corners = vertices[triangles]
+    result = np.empty(len(points))
+    step = max(1, 500_000 // max(1, len(corners)))
+    for start in range(0, len(points), step):
+        a, b, c = np.moveaxis(corners - points[start : start + step, None, None], 2, 0)
+        la, lb, lc = (np.linalg.norm(v, axis=2) for v in (a, b, c))
+        numerator = np.einsum("pfd,pfd->pf", a, np.cross(b, c))
+        ab, bc, ca = (np.einsum("pfd,pfd->pf", u, v) for u, v in ((a, b), (b, c), (c, a)))
+        angle = np.arctan2(numerator, la * lb * lc + ab * lc + bc * la + ca * lb)
+        result[start : start + step] = angle.sum(axis=1) / (2 * np.pi)
+    return result
 
 
 def genus(vertices: Vertices, triangles: Triangles) -> int:

@@ -10,12 +10,12 @@ from typing import Any
 import attrs
 import numpy as np
 from scipy import sparse
-from scipy.sparse.csgraph import connected_components, dijkstra
+from scipy.sparse.csgraph import dijkstra
 
 from ..arrays import Array
 from ..design.quantity import in_kPa
 from ..errors import InputError
-from ..meshing.mesh import AXES, LATTICE, Mesh
+from ..meshing.mesh import AXES, LATTICE, Mesh, pieces
 from .outer_faces import free_boundary
 from .parallel_edges import reweigh
 from .self_friction import SelfFriction
@@ -584,11 +584,9 @@ class SelfContact:
 
 def _parts(mesh: Mesh) -> Array:
     """Number (n,) of the part of a resolved mesh that each node is of: the wall 0, struts, bar and seats."""
-    ends = mesh.tets[:, [0]].repeat(mesh.tets.shape[1] - 1, axis=1).ravel(), mesh.tets[:, 1:].ravel()
-    graph = sparse.coo_matrix((np.ones(len(ends[0]), bool), ends), shape=(len(mesh.nodes),) * 2)
-    number = connected_components(graph, directed=False)[1] + 1
+    number = pieces(mesh) + 1
     number[mesh.tets[mesh.region != LATTICE]] = 0
-    return np.asarray(number)
+    return number
 
 
 def _free_facets(mesh: Mesh) -> Array:

@@ -8,7 +8,7 @@ from collections.abc import Sequence
 import attrs
 import numpy as np
 
-from ..arrays import Array
+from ..arrays import Array, connected
 from ..design.printing.crossing import near_pairs
 from ..meshing.mesh import LATTICE, TET_EDGES, Mesh, boundary_faces, mirror, mirror_displacement
 from .state import State
@@ -139,19 +139,12 @@ class _Boundary:
 
     def _groups(self, pairs: Array) -> list[Array]:
         """Pairs (p, 2) of facets in groups, those whose facets share nodes together, the largest first."""
-        from scipy.sparse import coo_matrix
-        from scipy.sparse.csgraph import connected_components
-
         if not len(pairs):
             return []
         nodes = self.facets[pairs].reshape(len(pairs), -1)
         pair = np.repeat(np.arange(len(pairs)), nodes.shape[1])
-        graph = coo_matrix(
-            (np.ones(nodes.size), (pair, len(pairs) + nodes.ravel())),
-            shape=(len(pairs) + len(self._rest),) * 2,
-        )
-        _, label = connected_components(graph, directed=False)
-        groups = [pairs[label[: len(pairs)] == g] for g in np.unique(label[: len(pairs)])]
+        label = connected(len(pairs) + len(self._rest), pair, len(pairs) + nodes.ravel())[: len(pairs)]
+        groups = [pairs[label == g] for g in np.unique(label)]
         return sorted(groups, key=len, reverse=True)
 
     def _crossing(self, corners: Array, pairs: Array) -> Crossing:

@@ -13,9 +13,8 @@ from ..errors import InputError, MeshingError
 from ..fem.elements import even_points, shape_functions
 from ..fem.laws import NeoHooke
 from ..fem.materials import Materials
-from ..meshing.mesh import Mesh
+from ..meshing.mesh import Mesh, pieces
 from ..meshing.surface import mesh_surface
-from .octant import pieces
 
 # Points of an element at which it is asked whether it lies in the skin: a corner's share of barycentric
 # coordinates in steps of a quarter, which makes 20.

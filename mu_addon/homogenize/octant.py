@@ -21,7 +21,7 @@ from ..fem.factor import Cholesky, IndefiniteError, SuperLU, make_factor
 from ..fem.materials import Materials
 from ..fem.model import Model
 from ..fem.sparsity import Pattern
-from ..meshing.mesh import AXES, Mesh
+from ..meshing.mesh import AXES, Mesh, pieces
 from ..meshing.tiling import box_of
 
 # Voigt's order, and the axes each shear is of.
@@ -149,15 +149,6 @@ class Octant:
 
     def _part(self, fixed: Array) -> Part:
         return part(self.model.pattern, np.flatnonzero(~fixed.ravel()))
-
-
-def pieces(mesh: Mesh) -> Array:
-    """Number (n,), from 0, of the connected piece that each node of a mesh belongs to."""
-    from scipy.sparse.csgraph import connected_components
-
-    first, other = mesh.tets[:, :1].repeat(mesh.tets.shape[1] - 1, axis=1), mesh.tets[:, 1:]
-    links = sparse.coo_matrix((np.ones(other.size), (first.ravel(), other.ravel())), (len(mesh.nodes),) * 2)
-    return np.asarray(connected_components(links, directed=False)[1])
 
 
 def require_factor(part: Part, values: Array) -> None:

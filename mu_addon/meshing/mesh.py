@@ -8,7 +8,7 @@ from typing import Any
 import attrs
 import numpy as np
 
-from ..arrays import Array, float64, int32
+from ..arrays import Array, connected, float64, int32
 from ..errors import MeshingError
 
 MEMBRANE, LATTICE = 1, 2
@@ -256,6 +256,12 @@ def boundary_faces(tets: Array) -> tuple[Array, Array]:
     _, first, count = np.unique(np.sort(faces, axis=1), axis=0, return_index=True, return_counts=True)
     single = np.sort(first[count == 1])
     return faces[single], single // 4
+
+
+def pieces(mesh: Mesh) -> Array:
+    """Number (n,), from 0, of the connected piece that each node of a mesh belongs to."""
+    first, others = mesh.tets[:, :1], mesh.tets[:, 1:]
+    return connected(len(mesh.nodes), np.broadcast_to(first, others.shape).ravel(), others.ravel())
 
 
 def edge_keys(edges: Array, count: int) -> Array:

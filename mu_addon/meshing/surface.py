@@ -14,7 +14,7 @@ from typing import Any
 import numpy as np
 
 from ..arrays import Array
-from ..design.surface import bad_edges
+from ..design.surface import bad_edges, winding_number
 from ..errors import InputError, MeshingError
 from ..files import read_npz, write_npz
 from .mesh import LATTICE, Mesh, boundary_faces, edges_of, oriented, second_order
@@ -82,25 +82,6 @@ def _inside(points: Array, faces: Array, nodes: Array, tets: Array, epsilon: flo
         edges, _ = edges_of(tets)
         nodes, tets, none = second_order(nodes, tets, none, nodes[edges].mean(axis=1))
     return Mesh(nodes, tets, np.full(len(tets), LATTICE), none, base=[], tip=[])
-
-
-def winding_number(vertices: Array, triangles: Array, points: Array) -> Array:
-    """Winding number (n,) of a closed surface around points (n, 3) in mm: 1 inside, 0 outside.
-
-    The sum of the solid angles of its triangles (f, 3) over 4 pi. Source: Van Oosterom and Strackee,
-    IEEE Trans. Biomed. Eng. BME-30 (1983) 125.
-    """
-    corners = vertices[triangles]
-    result = np.empty(len(points))
-    step = max(1, 500_000 // max(1, len(corners)))
-    for start in range(0, len(points), step):
-        a, b, c = np.moveaxis(corners - points[start : start + step, None, None], 2, 0)
-        la, lb, lc = (np.linalg.norm(v, axis=2) for v in (a, b, c))
-        numerator = np.einsum("pfd,pfd->pf", a, np.cross(b, c))
-        ab, bc, ca = (np.einsum("pfd,pfd->pf", u, v) for u, v in ((a, b), (b, c), (c, a)))
-        angle = np.arctan2(numerator, la * lb * lc + ab * lc + bc * la + ca * lb)
-        result[start : start + step] = angle.sum(axis=1) / (2 * np.pi)
-    return result
 
 
 def _cached(

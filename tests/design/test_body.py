@@ -140,7 +140,7 @@ def test_a_body_must_hold_the_chambers_from_end_to_end():
 @settings(max_examples=25)
 @given(st.integers(0, 2**32 - 1))
 def test_inside_is_what_winding_says(seed):
-    from mu_addon.meshing.surface import winding_number
+    from mu_addon.design.surface import winding_number
 
     random = np.random.default_rng(seed)
     body = cylinder(*random.uniform(5, 30, 2), random.uniform(-9, 9), -3.0, 40.0, int(random.integers(3, 30)))

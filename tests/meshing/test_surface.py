@@ -13,11 +13,12 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 
+from mu_addon.design.surface import winding_number
 from mu_addon.errors import InputError, MeshingError
 from mu_addon.meshing import LATTICE, mesh_surface
 from mu_addon.meshing.mesh import Mesh, boundary_faces, oriented
 from mu_addon.meshing.quality import element_volumes
-from mu_addon.meshing.surface import _fullness, winding_number
+from mu_addon.meshing.surface import _fullness
 
 
 def sphere(radius: float, subdivisions: int = 2) -> trimesh.Trimesh:

@@ -10,6 +10,8 @@ import attrs
 import numpy as np
 from numpy.typing import NDArray
 
+from ...arrays import connected
+
 Index = NDArray[np.int64]
 
 _AT_ONCE = 16_000_000
@@ -112,18 +114,6 @@ def meeting(one: Runs, other: Runs, shift: int, reach: int = 0) -> tuple[Index, 
     return owner, np.arange(len(owner)) - np.repeat(begin - first, count)
 
 
-def joined(count: int, pairs: list[tuple[Index, Index]]) -> tuple[int, NDArray[np.int32]]:
-    """Number of the groups that pairs of `count` things form, and each thing's group (count,)."""
-    from scipy.sparse import coo_matrix
-    from scipy.sparse.csgraph import connected_components
-
-    a = np.concatenate([pair[0] for pair in pairs]) if pairs else np.empty(0, np.int64)
-    b = np.concatenate([pair[1] for pair in pairs]) if pairs else np.empty(0, np.int64)
-    graph = coo_matrix((np.ones(len(a), np.int8), (a, b)), shape=(count, count))
-    number, group = connected_components(graph, directed=False)
-    return int(number), group
-
-
 @attrs.frozen(eq=False)
 class Parts:
     """Parts of a grid's marked cells that are connected by the cells' sides.
@@ -156,5 +146,8 @@ def parts_of(marked: NDArray[np.bool_]) -> Parts:
     runs = runs_of(marked)
     one, other = meeting(runs, runs, 1)
     beside = runs.line[one] % rows != rows - 1
-    count, part = joined(len(runs.line), [(one[beside], other[beside]), meeting(runs, runs, rows)])
-    return Parts(marked.shape, runs, part, count)
+    above, below = meeting(runs, runs, rows)
+    part = connected(
+        len(runs.line), np.concatenate([one[beside], above]), np.concatenate([other[beside], below])
+    )
+    return Parts(marked.shape, runs, part, int(part.max(initial=-1)) + 1)

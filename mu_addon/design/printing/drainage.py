@@ -7,6 +7,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from ...arrays import connected
 from .. import shapes
 from ..dimensions import Dimensions
 from ..parameters import Unit
@@ -173,7 +174,7 @@ def necks(
     long. An empty list if the parts are not connected, or one is empty.
     """
     from scipy.sparse import coo_matrix
-    from scipy.sparse.csgraph import breadth_first_order, connected_components, maximum_flow
+    from scipy.sparse.csgraph import breadth_first_order, maximum_flow
 
     m = len(triangles)
     e = edges(triangles)
@@ -203,7 +204,6 @@ def necks(
         return []
     used, index = np.unique(ends[cut], return_inverse=True)
     first, second = index.reshape(-1, 2).T
-    links = coo_matrix((np.ones(len(first)), (first, second)), shape=(len(used),) * 2)
-    curve = connected_components(links, directed=False)[1][first]
+    curve = connected(len(used), first, second)[first]
     middle = vertices[ends[cut]].mean(axis=1)
     return [middle[curve == k] for k in range(int(curve.max()) + 1)]

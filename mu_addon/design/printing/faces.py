@@ -8,7 +8,8 @@ import attrs
 import numpy as np
 from numpy.typing import NDArray
 
-from ..surface import Triangles, Vertices
+from ...arrays import connected
+from ..surface import Triangles, Vertices, winding_number
 from .finding import NOWHERE, Points
 
 MOST_SHELLS = 400
@@ -74,16 +75,13 @@ def open_places(vertices: Vertices, triangles: Triangles) -> tuple[Points, int]:
     vertices (n, 3) in mm, triangles (m, 3). An edge is open unless exactly two triangles share it; a hole is
     a connected set of open edges.
     """
-    from scipy.sparse import coo_matrix
-    from scipy.sparse.csgraph import connected_components
-
     e = edges(triangles)
     ends = e.ends[np.bincount(e.of_side) != 2]
     if not len(ends):
         return NOWHERE, 0
     used, index = np.unique(ends, return_inverse=True)
     a, b = index.reshape(-1, 2).T
-    label = connected_components(coo_matrix((np.ones(len(a)), (a, b)), shape=(len(used),) * 2), False)[1][a]
+    label = connected(len(used), a, b)[a]
     length = np.linalg.norm(vertices[ends[:, 1]] - vertices[ends[:, 0]], axis=1)
     middle = vertices[ends].mean(axis=1)
     around = np.bincount(label, length)
@@ -96,8 +94,6 @@ def turned(vertices: Vertices, triangles: Triangles) -> NDArray[np.bool_]:
 
     vertices (n, 3) in mm. Two triangles are joined if they alone share an edge.
     """
-    from scipy.sparse.csgraph import connected_components
-
     m = len(triangles)
     e = edges(triangles)
     order = np.argsort(e.of_side, kind="stable")
@@ -110,7 +106,7 @@ def turned(vertices: Vertices, triangles: Triangles) -> NDArray[np.bool_]:
     if agree.all():
         return wrong
     a, b = first % m, second % m
-    patch = connected_components(_graph(a[agree], b[agree], m), directed=False)[1]
+    patch = connected(m, a[agree], b[agree])
     area = np.linalg.norm(_area_vectors(vertices, triangles), axis=1)
     size = np.bincount(patch, area)
     links = _graph(patch[a[~agree]], patch[b[~agree]], len(size))
@@ -123,11 +119,11 @@ def _against_the_larger(links: Any, size: NDArray[Any]) -> NDArray[np.bool_]:
     links: between patches that face each other's way, as a sparse matrix (n, n).
     """
     from scipy.sparse import coo_matrix
-    from scipy.sparse.csgraph import breadth_first_order, connected_components
+    from scipy.sparse.csgraph import breadth_first_order
 
     n = len(size)
     links = coo_matrix(links + links.T)
-    group = connected_components(links, directed=False)[1]
+    group = connected(n, links.row, links.col)
     # The largest patch of each group, and one walk through all of them from a node that is linked to these.
     largest_last = np.lexsort((-np.arange(n), size, group))
     roots = largest_last[np.cumsum(np.bincount(group)) - 1]
@@ -147,14 +143,12 @@ def pieces(vertices: Vertices, triangles: Triangles) -> Pieces:
     The kind follows from the sign of a shell's volume and from whether the other shells enclose it, by the
     winding number; beyond the MOST_SHELLS largest, shells count as not enclosed.
     """
-    from scipy.sparse.csgraph import connected_components
-
     m = len(triangles)
     e = edges(triangles)
     order = np.argsort(e.of_side, kind="stable") % m
     same = e.of_side[np.argsort(e.of_side, kind="stable")]
     linked = same[1:] == same[:-1]
-    label = connected_components(_graph(order[1:][linked], order[:-1][linked], m), directed=False)[1]
+    label = connected(m, order[1:][linked], order[:-1][linked])
     shells = _shells(vertices, triangles, label)
     shells.sort(key=lambda shell: -abs(shell.volume))
     around = Surroundings(vertices, triangles, shells)
@@ -190,24 +184,9 @@ class Surroundings:
         holds = ((self._low <= at) & (at <= self._high)).all(axis=1)
         holds[number] = False
         others = (self._shells[k].triangles for k in np.flatnonzero(holds))
-        return [winding(at, self._vertices[self._triangles[members]]) for members in others]
-
-
-def winding(point: Points, corners: Points) -> float:
-    """Winding number of triangles, corners (m, 3, 3), around a point (3,): their solid angles over 4 pi.
-
-    Corners and point are in one unit of length. Source: Van Oosterom and Strackee, IEEE Trans. Biomed. Eng.
-    30 (1983) 125.
-    """
-    if not len(corners):
-        return 0.0
-    a, b, c = np.moveaxis(corners - point, 1, 0)
-    la, lb, lc = (np.linalg.norm(v, axis=1) for v in (a, b, c))
-    top = np.einsum("ij,ij->i", a, np.cross(b, c))
-    below = la * lb * lc
-    for (u, v), length in (((a, b), lc), ((b, c), la), ((c, a), lb)):
-        below += np.einsum("ij,ij->i", u, v) * length
-    return float(np.arctan2(top, below).sum() / (2.0 * np.pi))
+        return [
+            float(winding_number(self._vertices, self._triangles[members], at[None])[0]) for members in others
+        ]
 
 
 def _shells(vertices: Vertices, triangles: Triangles, label: NDArray[np.integer]) -> list[Shell]:

@@ -8,6 +8,7 @@ import attrs
 import numpy as np
 from numpy.typing import NDArray
 
+from ...arrays import connected
 from .printer import Limit, Printer
 
 Severity = Literal["error", "warning", "pass", "info"]
@@ -53,8 +54,6 @@ def clustered(points: Points, badness: NDArray[np.float64] | None = None, reach:
     It is the group's point of the greatest badness (n,), the group of the worst first; or, without badness,
     its mean, the largest group first.
     """
-    from scipy.sparse import coo_matrix
-    from scipy.sparse.csgraph import connected_components
     from scipy.spatial import cKDTree
 
     if not len(points):
@@ -63,8 +62,7 @@ def clustered(points: Points, badness: NDArray[np.float64] | None = None, reach:
     box = np.unique(np.floor(points / (reach / 2.0)).astype(np.int64), axis=0, return_inverse=True)
     cells, index = box[0], np.ravel(box[1])
     pairs = cKDTree(cells * (reach / 2.0)).query_pairs(reach, output_type="ndarray")
-    graph = coo_matrix((np.ones(len(pairs)), (pairs[:, 0], pairs[:, 1])), shape=(len(cells),) * 2)
-    group = connected_components(graph, directed=False)[1][index]
+    group = connected(len(cells), *pairs.T)[index]
     size = np.bincount(group)
     if badness is None:
         middle = [np.bincount(group, points[:, k]) / size for k in range(3)]

@@ -9,8 +9,8 @@ import attrs
 import numpy as np
 from numpy.typing import NDArray
 
-from ...arrays import Array
-from .cell_runs import Runs, joined, meeting
+from ...arrays import Array, connected
+from .cell_runs import Runs, meeting
 from .voxels import VoxelRows
 
 
@@ -69,7 +69,8 @@ def regions(grid: VoxelRows, free: bool, at_once: int = 8_000_000) -> Regions:
             runs = runs.complement(first * rows, last * rows)
         one, other = meeting(runs, runs, 1, 0 if free else 1)
         beside = runs.line[one] % rows != rows - 1
-        count, part = joined(len(runs.line), [(one[beside], other[beside])])
+        part = connected(len(runs.line), one[beside], other[beside])
+        count = int(part.max(initial=-1)) + 1
         length = runs.end - runs.start
         at_layer, at_row = runs.line // rows, runs.line % rows
         number = np.bincount(part, length, count)

@@ -12,6 +12,7 @@ import attrs
 import numpy as np
 from numpy.typing import NDArray
 
+from ...arrays import connected
 from ..surface import Triangles, Vertices, bad_edges, volume
 from . import faces
 from .crossing import MOST_CROSSINGS, crossings
@@ -172,8 +173,6 @@ def _closed_gaps(
     A group of vertices wider than the gap is left: the pairs to merge are ambiguous. So are the ends of one
     edge: merging them would remove a face without closing a gap.
     """
-    from scipy.sparse import coo_matrix
-    from scipy.sparse.csgraph import connected_components
     from scipy.spatial import cKDTree
 
     index = np.arange(len(vertices))
@@ -191,8 +190,7 @@ def _closed_gaps(
     pairs = tree.query_pairs(gap_mm, output_type="ndarray")
     if not len(pairs):
         return vertices, index, 0, 0.0
-    graph = coo_matrix((np.ones(len(pairs)), pairs.T), shape=(len(rim),) * 2)
-    group = connected_components(graph, directed=False)[1]
+    group = connected(len(rim), *pairs.T)
     linked = {tuple(pair) for pair in e.ends.tolist()}
     points = vertices.copy()
     merged, move = 0, 0.0

@@ -15,6 +15,7 @@ from mu_addon.design.printing.orientation import Build, directions, fits, ranked
 from mu_addon.design.printing.printer import load_printer
 from mu_addon.design.printing.thickness import cast_rays, samples
 from mu_addon.design.printing.voxels import frame_along, voxel_rows
+from mu_addon.design.surface import winding_number
 
 from .parts import arrays
 
@@ -293,12 +294,13 @@ def test_the_kind_of_each_of_many_shells_is_that_by_all_others(seed):
             seen.add(number)
             own = vertices[triangles[shell == number]]
             at = vertices[triangles[mixed][piece.triangles[0]]].mean(axis=0)
-            around = faces.winding(at, vertices[triangles[shell != number]])
-            outward = faces.winding(own.reshape(-1, 3).mean(axis=0), own) > 0.0
+            around = winding_number(vertices, triangles[shell != number], at[None])[0]
+            middle = own.reshape(-1, 3).mean(axis=0)
+            outward = winding_number(vertices, triangles[shell == number], middle[None])[0] > 0.0
             largest = abs(piece.volume) == max(abs(p.volume) for group in kinds.values() for p in group)
             inside = around > 0.5 and not (largest and outward)
             assert kind == (("nested" if inside else "bodies") if outward else "voids" if inside else "over")
-            assert piece.centroid == pytest.approx(own.reshape(-1, 3).mean(axis=0), abs=0.02)
+            assert piece.centroid == pytest.approx(middle, abs=0.02)
     assert seen == set(range(40))
 
 
@@ -318,10 +320,9 @@ def test_of_each_of_many_shells_the_smaller_part_is_turned():
 
 def test_winding_counts_how_often_a_surface_goes_round():
     vertices, triangles = arrays(shapes.ball(2.0, 24))
-    corners = vertices[triangles]
-    assert faces.winding(np.zeros(3), corners) == pytest.approx(1.0)
-    assert faces.winding(np.array([3.0, 1.0, 0.0]), corners) == pytest.approx(0.0, abs=1e-9)
-    assert faces.winding(np.zeros(3), corners[:, ::-1]) == pytest.approx(-1.0)
+    points = np.array([[0.0, 0.0, 0.0], [3.0, 1.0, 0.0]])
+    assert winding_number(vertices, triangles, points) == pytest.approx([1.0, 0.0], abs=1e-9)
+    assert winding_number(vertices, triangles[:, ::-1], points) == pytest.approx([-1.0, 0.0], abs=1e-9)
 
 
 @settings(max_examples=40)
