@@ -20,6 +20,7 @@ from ..errors import InputError
 from ..fem.embedding import Probe
 from ..fem.materials import Materials
 from ..fem.model import Model
+from ..fem.rotations import nearest_rotations
 from ..fem.trajectory import Trajectory
 from ..meshing.mesh import LATTICE, Mesh
 from ..placement.graph import Graph
@@ -139,9 +140,7 @@ def _moved_joints(
     for j, nodes in enumerate(joints):
         rest, now = mesh.nodes[nodes], mesh.nodes[nodes] + u[nodes]
         arms, before = now - now.mean(axis=0), rest - rest.mean(axis=0)
-        left, _, right = np.linalg.svd(arms.T @ before)
-        left[:, 2] *= np.linalg.det(left @ right)
-        turn[j] = left @ right
+        turn[j] = nearest_rotations((arms.T @ before)[None])[0]
         place[j] = now.mean(axis=0) + turn[j] @ (points[j] - rest.mean(axis=0))
         inertia = (arms**2).sum() * np.eye(3) - arms.T @ arms
         spin = np.linalg.inv(inertia)

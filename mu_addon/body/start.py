@@ -8,6 +8,7 @@ from ..arrays import Array
 from ..fem.carried_nodes import following
 from ..fem.equilibrium import Equilibrium
 from ..fem.kinematics import mean_gradients, numbers_of
+from ..fem.rotations import nearest_rotations
 from ..meshing.mesh import Mesh
 
 # Weight of the surroundings' rotation beside the legs of a path.
@@ -118,22 +119,14 @@ def _turns(around: Array, way: Array, bent: Array) -> Array:
     wanted = _TWIST * around
     wanted[:-1] += leg
     wanted[1:] += leg
-    found = _nearest(wanted)
+    found = nearest_rotations(wanted)
     if len(way) > 1:
         # Beyond the last inner joint a leg goes on bending as it does there.
         for end, inner, last in ((0, 1, 0), (-1, -2, -1)):
             slope = 2.0 * bent[last] - found[inner] @ way[last]
             wanted[end] = _TWIST * around[end] + slope[:, None] * way[last] / scale[last]
-        found = _nearest(wanted)
+        found = nearest_rotations(wanted)
     return found
-
-
-def _nearest(matrices: Array) -> Array:
-    """The rotations (h, 3, 3) nearest to some matrices (h, 3, 3)."""
-    left, _, right = np.linalg.svd(matrices)
-    # A reflection would fit no body.
-    left[:, :, 2] *= np.linalg.det(left @ right)[:, None]
-    return np.asarray(left @ right)
 
 
 def _hermite(ends: Array, slopes: Array, t: Array) -> tuple[Array, Array]:

@@ -17,7 +17,7 @@ from . import shapes
 from .dimensions import Dimensions
 from .printing.crossing import MOST_CROSSINGS, crossings
 from .profile import outer_polygon
-from .surface import UNITS, Triangles, Vertices, volume, weld
+from .surface import UNITS, Triangles, Vertices, odd_edges, volume, weld
 from .surface_reading import SUFFIXES, read_surface, require_mesh
 
 if TYPE_CHECKING:
@@ -118,7 +118,7 @@ def body_of(vertices: ArrayLike, triangles: ArrayLike, name: str = "body") -> Bo
         # It reports the fault; welding would change such numbers.
         return Body(*given, name)
     points, faces = weld(*given, QUANTUM_MM)
-    if len(faces) and not len(_odd_edges(faces)[0]) and volume(points, faces) < 0.0:
+    if len(faces) and not len(odd_edges(faces)[0]) and volume(points, faces) < 0.0:
         faces = faces[:, ::-1]
     return Body(points, faces, name)
 
@@ -150,7 +150,7 @@ def flaws(body: Body) -> list[Flaw]:
     Without these faults the number of separate bodies and the sign of the volume are checked.
     """
     v, t = body.vertices, body.triangles
-    open_, crowded = _odd_edges(t)
+    open_, crowded = odd_edges(t)
     found = []
     if len(open_):
         found.append(
@@ -382,15 +382,6 @@ def inside(body: Body, points: ArrayLike) -> NDArray[np.bool_]:
 def _area(p: NDArray[np.float64], q: NDArray[np.float64], r: NDArray[np.float64]) -> NDArray[np.float64]:
     """Twice the signed area of triangles seen along z."""
     return np.asarray((q[:, 0] - p[:, 0]) * (r[:, 1] - p[:, 1]) - (q[:, 1] - p[:, 1]) * (r[:, 0] - p[:, 0]))
-
-
-def _odd_edges(triangles: Triangles) -> tuple[Triangles, Triangles]:
-    """Edges (k, 2) not used once in each direction: those of one or two triangles, and of more."""
-    ends = triangles[:, [[0, 1], [1, 2], [2, 0]]].reshape(-1, 2)
-    edges, place = np.unique(np.sort(ends, axis=1), axis=0, return_inverse=True)
-    ahead = np.bincount(place.ravel(), weights=ends[:, 0] < ends[:, 1], minlength=len(edges))
-    total = np.bincount(place.ravel(), minlength=len(edges))
-    return edges[(total <= 2) & ~((ahead == 1) & (total == 2))], edges[total > 2]
 
 
 def _middle(piece: Any) -> list[float]:

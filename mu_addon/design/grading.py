@@ -187,11 +187,8 @@ class Field:
         )
 
     def _of_cells(self, p: Array) -> Array:
-        return self._interpolated(self.cell_factors, p)
-
-    def _interpolated(self, table: Array, p: Array) -> Array:
-        """Values of cells, at their centres, linear along each axis between them; (n,) at points (n, 3)."""
-        u = self.cell
+        """Factors of cells, at their centres, linear along each axis between them; (n,) at points (n, 3)."""
+        table, u = self.cell_factors, self.cell
         place = np.stack([np.abs(p[:, 0]) / u, p[:, 1] / u + self.y_minus, p[:, 2] / u - 0.5], axis=1)
         place = np.clip(place, 0.0, np.array(table.shape) - 1.0)
         low = np.minimum(place.astype(int), np.maximum(np.array(table.shape) - 2, 0))

@@ -43,12 +43,16 @@ def bad_edges(triangles: Triangles) -> int:
     >>> bad_edges(np.array([[0, 1, 2], [0, 3, 1], [1, 3, 2], [2, 3, 0]]))
     0
     """
-    ends = np.concatenate([triangles[:, [0, 1]], triangles[:, [1, 2]], triangles[:, [2, 0]]])
-    forward = ends[:, 0] < ends[:, 1]
-    index = _unique_rows(np.sort(ends, axis=1))[1]
-    ahead = np.bincount(index, weights=forward)
-    back = np.bincount(index, weights=~forward)
-    return int(np.count_nonzero((ahead != 1) | (back != 1)))
+    return sum(map(len, odd_edges(triangles)))
+
+
+def odd_edges(triangles: Triangles) -> tuple[Triangles, Triangles]:
+    """Edges (k, 2) not used once in each direction: those of one or two triangles, and of more."""
+    ends = triangles[:, [[0, 1], [1, 2], [2, 0]]].reshape(-1, 2)
+    edges, place = _unique_rows(np.sort(ends, axis=1))
+    ahead = np.bincount(place, weights=ends[:, 0] < ends[:, 1], minlength=len(edges))
+    total = np.bincount(place, minlength=len(edges))
+    return edges[(total <= 2) & ~((ahead == 1) & (total == 2))], edges[total > 2]
 
 
 def volume(vertices: Vertices, triangles: Triangles) -> float:

@@ -10,7 +10,7 @@ import io
 import zipfile
 from collections.abc import Iterable, Sequence
 from xml.etree import ElementTree
-from xml.sax.saxutils import quoteattr
+from xml.sax.saxutils import escape, quoteattr
 
 import attrs
 import numpy as np
@@ -85,7 +85,7 @@ def write_3mf(parts: Sequence[Part], printed: Sequence[int], title: str) -> byte
     lines = [
         '<?xml version="1.0" encoding="UTF-8"?>',
         f'<model unit="millimeter" xml:lang="en-US" xmlns="{CORE}"{extension}>',
-        f' <metadata name="Title">{_text(title)}</metadata>',
+        f' <metadata name="Title">{escape(title)}</metadata>',
         " <resources>",
     ]
     for number, part in enumerate(parts, 1):
@@ -112,10 +112,6 @@ def write_3mf(parts: Sequence[Part], printed: Sequence[int], title: str) -> byte
             entry.compress_type = zipfile.ZIP_DEFLATED
             package.writestr(entry, text)
     return packed.getvalue()
-
-
-def _text(text: str) -> str:
-    return text.replace("&", "&amp;").replace("<", "&lt;").replace(">", "&gt;")
 
 
 def _mesh(part: Part) -> Iterable[str]:

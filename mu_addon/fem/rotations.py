@@ -23,3 +23,11 @@ def rotation(w: Array) -> Array:
     hat = skew(w)
     half = np.sinc(angle / (2 * np.pi))
     return np.asarray(np.eye(3) + np.sinc(angle / np.pi) * hat + half**2 / 2 * (hat @ hat))
+
+
+def nearest_rotations(matrices: Array) -> Array:
+    """The rotations (h, 3, 3) nearest to some matrices (h, 3, 3), by Kabsch's method."""
+    left, _, right = np.linalg.svd(matrices)
+    # A reflection would fit no body.
+    left[:, :, 2] *= np.linalg.det(left @ right)[:, None]
+    return np.asarray(left @ right)

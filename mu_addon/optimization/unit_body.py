@@ -36,18 +36,6 @@ STEP = 1e-4
 smaller)."""
 
 
-def _same(unit: Unit) -> Unit:
-    return unit
-
-
-def _model(unit: Unit, mesh: Mesh) -> Model:
-    return Model(mesh, threads=1)
-
-
-def _materials(unit: Unit, mesh: Mesh) -> Materials:
-    return materials_of(unit, mesh)
-
-
 @attrs.frozen(eq=False)
 class Mechanics:
     """Settings of a printed unit's simulation: mesh, and the changes of an extended model.
@@ -58,9 +46,9 @@ class Mechanics:
     """
 
     settings: MeshSettings = attrs.field(factory=lambda: MeshSettings(refine=0.5))
-    as_printed: Callable[[Unit], Unit] = _same
-    materials: Callable[[Unit, Mesh], Materials] = _materials
-    model: Callable[[Unit, Mesh], Model] = _model
+    as_printed: Callable[[Unit], Unit] = lambda unit: unit
+    materials: Callable[[Unit, Mesh], Materials] = materials_of
+    model: Callable[[Unit, Mesh], Model] = lambda unit, mesh: Model(mesh, threads=1)
     load: Callable[[Unit, Mesh], Array | None] = lambda unit, mesh: None
     cache: Path | None = None
     body: Body | None = None
