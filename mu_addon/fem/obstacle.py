@@ -65,8 +65,8 @@ class Obstacle:
     does so in `simulate_in_time`. Faces of the base, the cavity and mirror planes do not touch. halvings: of
     a face's sides, with quadrature points on the pieces; large faces need some to have contact near their
     edges. faces: those of `outer_faces` that can touch, to save time. In a resolved mesh the parts of a strut
-    inside another part do not touch, and forces on tied nodes act on their masters, as in `Model`. Raises
-    InputError.
+    inside another part do not touch, and forces on tied nodes act on their masters, as in `Model`. Methods
+    take displacements u (n, 3) in mm. Raises InputError.
     """
 
     def __init__(
@@ -310,31 +310,19 @@ class Obstacle:
         return np.asarray(np.einsum("qa,fai->fqi", self._shape, (self._rest + u)[self.faces]))
 
     def gap_mm(self, u: Array) -> float:
-        """Least distance in mm of the surface's points from the obstacle, negative where they touch.
-
-        u: displacements (n, 3) in mm.
-        """
+        """Least distance in mm of the surface's points from the obstacle, negative where they touch."""
         return float(self._points(u)[1].min())
 
     def deepest_mm(self, u: Array) -> float:
-        """Largest depth in mm of the surface in the obstacle, 0 without contact: the gap error.
-
-        u: displacements (n, 3) in mm.
-        """
+        """Largest depth in mm of the surface in the obstacle, 0 without contact: the gap error."""
         return max(0.0, -float(self._points(u, self._near(u))[1].min(initial=np.inf)))
 
     def deepest_place(self, u: Array) -> Array:
-        """Place (3,) in mm, deformed, of the surface's point deepest in the obstacle, or nearest to it.
-
-        u: displacements (n, 3) in mm.
-        """
+        """Place (3,) in mm, deformed, of the surface's point deepest in the obstacle, or nearest to it."""
         return np.asarray(self.places(u).reshape(-1, 3)[self._points(u)[1].argmin()])
 
     def pressures_MPa(self, u: Array) -> tuple[Array, Array]:
-        """Places (k, 3) in mm of the points in contact, deformed, and the pressure (k,) in MPa on each.
-
-        u: displacements (n, 3) in mm.
-        """
+        """Places (k, 3) in mm of the points in contact, deformed, and the pressure (k,) in MPa on each."""
         face = self._near(u)
         pressure = self._pressure(self._points(u, face)[1])[0]
         on = pressure > 0

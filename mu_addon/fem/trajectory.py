@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from functools import partial
 
 import attrs
 import numpy as np
@@ -77,22 +76,14 @@ def branches(pressure_kPa: Array) -> tuple[Array, list[Array]]:
     return distinct, [side for side in sides if len(side)]
 
 
-def simulate(
-    equilibrium: Equilibrium,
-    time_s: Array,
-    pressure_kPa: Array,
-    on_state: Callable[[State], None] | None = None,
-    load: Callable[[float], State | None] = lambda pressure_MPa: None,
-    store: Callable[[State], None] = lambda state: None,
-) -> Trajectory:
+def simulate(equilibrium: Equilibrium, time_s: Array, pressure_kPa: Array) -> Trajectory:
     """Quasi-static motion of an elastic body: equilibria at times in s and pressures in kPa, (k,) each.
 
-    Every distinct pressure is solved once, outward from 0, suction last. on_state: called with each state.
-    load and store: a cache of states by pressure in MPa. A resumed run finds identical states, since each
-    starts only from earlier ones. The state without pressure is solved for only where the model has a load.
+    Every distinct pressure is solved once, outward from 0, suction last. The state without pressure is solved
+    for only where the model has a load.
 
-    Raises ConvergenceError if a pressure cannot be reached (on_state was called with all states before it),
-    and InputError for a body with friction or a law with history, which need `simulate_in_time`.
+    Raises ConvergenceError if a pressure cannot be reached, and InputError for a body with friction or a law
+    with history, which need `simulate_in_time`.
     """
     if equilibrium.model.has_friction or equilibrium.parameters.has_history:
         raise InputError(
@@ -100,27 +91,15 @@ def simulate(
             "trajectory.simulate",
             "use time_stepping.simulate_in_time",
         )
-
-    def state_at(pressure_MPa: float, solve: Callable[[], State]) -> State:
-        state = load(pressure_MPa)
-        if state is None:
-            state = solve()
-            store(state)
-        if on_state:
-            on_state(state)
-        return state
-
     distinct, sides = branches(pressure_kPa)
     model = equilibrium.model
-    start = rest(model.mesh) if model.load is None else state_at(0.0, equilibrium.at_zero_pressure)
+    start = rest(model.mesh) if model.load is None else equilibrium.at_zero_pressure()
     found = {0.0: start}
     # Under pressure first: nothing touches there, so that those states are soon known.
     for side in reversed(sides):
         history = [start]
         for pressure in side:
-            found[pressure] = state_at(
-                in_MPa(pressure), partial(equilibrium.reach, in_MPa(pressure), history)
-            )
+            found[pressure] = equilibrium.reach(in_MPa(pressure), history)
             history.append(found[pressure])
     solved = tuple(found[p] for p in distinct)
     return Trajectory(time_s, pressure_kPa, solved, np.searchsorted(distinct, pressure_kPa), model.mesh)
