@@ -11,7 +11,7 @@ import numpy as np
 from ..arrays import Array
 from ..errors import ConvergenceError
 from ..fem import kinematics
-from ..fem.elements import shape_functions, solid_volumes, tet_quadrature
+from ..fem.dead_loads import nodal_masses
 from ..fem.equilibrium import Equilibrium
 from ..fem.factor import IndefiniteError
 from ..fem.model import Model
@@ -67,14 +67,6 @@ MIRROR = np.array([1.0, -1.0, -1.0, -1.0, 1.0, 1.0])
 """Signs of a logarithm's components where space is mirrored in x = 0."""
 
 
-def nodal_mass_g(unit: Unit, mesh: Mesh, density_g_per_ml: float) -> Array:
-    """Mass (n,) in g of each node of a unit's mesh."""
-    points, _ = tet_quadrature(mesh.order)
-    mass = density_g_per_ml * 1e-3 * (solid_volumes(mesh) @ shape_functions(points, mesh.order))
-    of_node = np.bincount(mesh.tets.ravel(), mass.ravel(), len(mesh.nodes))
-    return np.asarray(mesh.folded(of_node))
-
-
 def tip_nodes(mesh: Mesh) -> Array:
     """Nodes (t,) in the plane of a mesh's tip that follow no other node."""
     on = mesh.nodes[:, 2] == mesh.nodes[mesh.tip[0], 2]
@@ -107,7 +99,7 @@ class PlateBody:
         self.equilibrium = Equilibrium(Model(mesh, supports, threads=threads), materials, settings)
         self._open = Model(mesh, threads=threads)
         self.parameters = self.equilibrium.parameters
-        nodal = nodal_mass_g(unit, mesh, density_g_per_ml)
+        nodal = mesh.folded(nodal_masses(mesh, density_g_per_ml * 1e-3))
         self.mass_g = float(nodal.sum())
         self._share = nodal / self.mass_g
         self._station = np.clip(mesh.nodes[:, 2] / self.height, 0.0, 1.0)

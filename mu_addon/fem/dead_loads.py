@@ -22,13 +22,16 @@ def gravity(
     density_tonne_per_mm3: of the undeformed body, one number or one an element (m,); 1 g/ml is 1e-9.
     direction (3,): of gravity, of any length. g_mm_per_s2: standard gravity by default.
     """
-    points, _ = tet_quadrature(mesh.order)
-    shape = shape_functions(points, mesh.order)
-    volumes = solid_volumes(mesh)
-    mass = np.broadcast_to(density_tonne_per_mm3, len(mesh.tets))[:, None] * (volumes @ shape)
-    of_node = np.bincount(mesh.tets.ravel(), mass.ravel(), len(mesh.nodes))
     down = np.asarray(direction, float)
-    return of_node[:, None] * (g_mm_per_s2 * down / np.linalg.norm(down))
+    return nodal_masses(mesh, density_tonne_per_mm3)[:, None] * (g_mm_per_s2 * down / np.linalg.norm(down))
+
+
+def nodal_masses(mesh: Mesh, density: float | Array) -> Array:
+    """Mass (n,) of each node, in units of density times mm3; density: one number or one an element (m,)."""
+    points, _ = tet_quadrature(mesh.order)
+    volumes = solid_volumes(mesh) @ shape_functions(points, mesh.order)
+    mass = np.broadcast_to(density, len(mesh.tets))[:, None] * volumes
+    return np.bincount(mesh.tets.ravel(), mass.ravel(), len(mesh.nodes))
 
 
 def traction(mesh: Mesh, faces: Array, traction_MPa: Array) -> Array:
