@@ -8,8 +8,9 @@ import attrs
 import numpy as np
 
 from ..arrays import Array
+from ..design.quantity import described
 from ..design.strut_cell import Facets, StrutCell, depth_below_surface, octant_surface
-from ..errors import InputError, MeshingError
+from ..errors import MeshingError
 from ..fem.elements import even_points, shape_functions
 from ..fem.laws import NeoHooke
 from ..fem.materials import Materials
@@ -27,26 +28,16 @@ _TRIES = (1.0, 0.8, 0.6, 0.4)
 
 @attrs.frozen
 class CellMeshSettings:
-    """Element sizes of a cell's mesh; raises InputError for a value out of bounds.
+    """Element sizes of a cell's mesh; raises InputError for a value out of bounds. facets: of the surface."""
 
-    order: of the elements; per_diameter: elements across the thinnest printed strut; facets: of the surface
-    to mesh; tolerance: of the mesh's distance from it, as a share of an element.
-    """
-
-    order: int = 2
-    per_diameter: float = 4.0
+    order: int = described("order", 2, "order of the elements", low=1, high=2).field()
+    per_diameter: float = described(
+        "per_diameter", 4.0, "elements across the thinnest printed strut", low=0.5, high=20.0
+    ).field()
     facets: Facets = attrs.field(factory=lambda: Facets(around=16, along=20))
-    tolerance: float = 0.02
-
-    def __attrs_post_init__(self) -> None:
-        if self.order not in (1, 2):
-            raise InputError(f"order = {self.order} is not offered", "cell mesh", "give 1 or 2")
-        if not 0.5 <= self.per_diameter <= 20.0:
-            raise InputError(
-                f"per_diameter = {self.per_diameter:g} is out of bounds", "cell mesh", "give 0.5 to 20"
-            )
-        if not 1e-4 <= self.tolerance <= 0.2:
-            raise InputError(f"tolerance = {self.tolerance:g} is out of bounds", "cell mesh", "1e-4 to 0.2")
+    tolerance: float = described(
+        "tolerance", 0.02, "distance from the cell's surface as a share of an element", low=1e-4, high=0.2
+    ).field()
 
 
 def mesh_cell(cell: StrutCell, settings: CellMeshSettings | None = None, cache: Path | None = None) -> Mesh:

@@ -19,7 +19,6 @@ from collections.abc import Callable, Sequence
 from functools import partial
 from typing import Any
 
-import attrs
 import numpy as np
 
 from ..arrays import Array
@@ -33,15 +32,10 @@ Pair = tuple[Structure, Structure, float]
 """The body with one freedom moved up, and down, and the difference of the freedom between the two."""
 
 
-@attrs.frozen(eq=False)
-class Adjoint:
-    """Solutions of the adjoint problem: for each condition the quantities it serves and lambda (free, k)."""
-
-    of: dict[Condition, tuple[tuple[int, ...], Array]]
-
-
-def adjoint(structure: Structure, states: States, quantities: Sequence[Quantity]) -> Adjoint:
-    """Factorise once a condition, and solve once for each quantity with a `slope` there.
+def _adjoint(
+    structure: Structure, states: States, quantities: Sequence[Quantity]
+) -> dict[Condition, tuple[tuple[int, ...], Array]]:
+    """For each condition the quantities with a `slope` there, and lambda (free, k): one factor, k solutions.
 
     Raises IndefiniteError at an unstable state.
     """
@@ -56,7 +50,7 @@ def adjoint(structure: Structure, states: States, quantities: Sequence[Quantity]
         slopes = np.stack([slope.ravel() for _, slope in served], axis=1)
         loads = model.passed_on(states[condition], slopes)[model.free]
         found[condition] = tuple(n for n, _ in served), factor.solve(np.ascontiguousarray(loads))
-    return Adjoint(found)
+    return found
 
 
 def gradients(
@@ -64,17 +58,14 @@ def gradients(
     states: States,
     quantities: Sequence[Quantity],
     pairs: Sequence[Callable[[], Pair]],
-    solved: Adjoint | None = None,
 ) -> Array:
     """Derivatives (q, f) of q quantities by f freedoms at a body's states.
 
     pairs: for each freedom a function that makes the two bodies; called in order, one held at a time but for
-    quantities without a slope. solved: `adjoint` of the same quantities, found here where it is not given.
-    nan where a freedom changes which struts a sensor meets. Raises IndefiniteError at an unstable state, and
-    the errors of making a body.
+    quantities without a slope. nan where a freedom changes which struts a sensor meets. Raises
+    IndefiniteError at an unstable state, and the errors of making a body.
     """
-    solved = solved or adjoint(structure, states, quantities)
-    changes = _changes(structure, states, solved)
+    changes = _changes(structure, states, quantities)
     direct = [q for q in quantities if q.conditions and not hasattr(q, "slope") and not hasattr(q, "change")]
     own = {condition for q in direct for condition in q.conditions}
     found = np.zeros((len(quantities), len(pairs)))
@@ -114,14 +105,14 @@ def gradients(
 
 
 def _changes(
-    structure: Structure, states: States, solved: Adjoint
+    structure: Structure, states: States, quantities: Sequence[Quantity]
 ) -> dict[Condition, tuple[list[int], Callable[[Structure, Structure], Array]]]:
     """Quantities that each condition of an adjoint serves, and the change of lambda . r between two bodies.
 
     Of a body with a sensor by both residuals: its ties may go to other nodes in a neighbour.
     """
     found: dict[Condition, tuple[list[int], Callable[[Structure, Structure], Array]]] = {}
-    for condition, (numbers, lam) in solved.of.items():
+    for condition, (numbers, lam) in _adjoint(structure, states, quantities).items():
         if condition.path != WITHOUT:
             found[condition] = list(numbers), partial(_along, lam, condition, states)
             continue
