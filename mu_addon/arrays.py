@@ -17,6 +17,16 @@ def int32(values: Any) -> Array:
     return np.ascontiguousarray(values, np.int32)
 
 
+def ranges(counts: Array, first: Array | int = 0) -> tuple[Array, Array]:
+    """Every number (k,) of some ranges, of `counts` (n,) from `first` (n,) on, after the row (k,) it is of.
+
+    >>> [found.tolist() for found in ranges(np.array([2, 0, 1]), np.array([5, 7, 9]))]
+    [[0, 0, 2], [5, 6, 9]]
+    """
+    row = np.repeat(np.arange(len(counts)), counts)
+    return row, np.arange(len(row)) + np.repeat(first - (np.cumsum(counts) - counts), counts)
+
+
 def connected(count: int, one: Array, other: Array) -> Array:
     """Number (count,), from 0, of each thing's group: `count` things, the links one (k,) to other (k,)."""
     from scipy.sparse import coo_matrix

@@ -11,6 +11,7 @@ import attrs
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from ..arrays import ranges
 from ..errors import InputError
 from ..reading import file_bytes
 from . import shapes
@@ -353,8 +354,7 @@ def inside(body: Body, points: ArrayLike) -> NDArray[np.bool_]:
     first, last = (np.clip(((c - origin) / step).astype(int), 0, n - 1) for c in (low, high))
     spans = last - first + 1
     count = spans.prod(axis=1)
-    which = np.repeat(np.arange(len(corners)), count)
-    nth = np.arange(len(which)) - np.repeat(np.cumsum(count) - count, count)
+    which, nth = ranges(count)
     column = (first[which, 0] + nth // spans[which, 1]) * n + first[which, 1] + nth % spans[which, 1]
     order = np.argsort(column, kind="stable")
     which, starts = which[order], np.searchsorted(column[order], np.arange(n * n + 1))
@@ -366,9 +366,9 @@ def inside(body: Body, points: ArrayLike) -> NDArray[np.bool_]:
     cell = place[rows, 0] * n + place[rows, 1]
     for some in np.array_split(np.arange(len(rows)), max(1, len(rows) // 20_000)):
         many = starts[cell[some] + 1] - starts[cell[some]]
-        point = np.repeat(rows[some], many)
-        nth = np.arange(len(point)) - np.repeat(np.cumsum(many) - many, many)
-        a, b, c = np.moveaxis(corners[which[np.repeat(starts[cell[some]], many) + nth]], 1, 0)
+        point, nth = ranges(many, starts[cell[some]])
+        point = rows[some][point]
+        a, b, c = np.moveaxis(corners[which[nth]], 1, 0)
         q = p[point]
         areas = [_area(q, b, c), _area(q, c, a), _area(q, a, b)]
         whole = areas[0] + areas[1] + areas[2]

@@ -8,7 +8,7 @@ import attrs
 import numpy as np
 from scipy import sparse
 
-from ..arrays import Array
+from ..arrays import Array, ranges
 from .beams import turned_curvature, turned_slopes
 from .rotations import rotation
 
@@ -145,10 +145,8 @@ class Carried:
         free = np.flatnonzero(at < 0)
         held = np.flatnonzero(at >= 0)
         many = (start[1:] - start[:-1])[at[held]]
-        which = np.repeat(held, many)
-        row = (
-            np.arange(len(which)) - np.repeat(np.cumsum(many) - many, many) + np.repeat(start[at[held]], many)
-        )
+        which, row = ranges(many, start[at[held]])
+        which = held[which]
         number = np.concatenate([free, which, which])
         mover = np.concatenate([nodes[free], self._node[row], self._turn[row]])
         operator = np.concatenate([np.zeros(len(free), int), 1 + row, 1 + k + row])
@@ -191,8 +189,7 @@ class Folding:
         first, second = number[: len(rows)], number[len(rows) :]
         many = np.diff(start)
         each = many[first] * many[second]
-        block = np.repeat(np.arange(len(rows)), each)
-        place = np.arange(len(block)) - np.repeat(np.cumsum(each) - each, each)
+        block, place = ranges(each)
         i = start[first][block] + place // many[second][block]
         j = start[second][block] + place % many[second][block]
         p, q, same = mover[i], mover[j], (rows == columns)[block]

@@ -5,7 +5,7 @@ from __future__ import annotations
 import attrs
 import numpy as np
 
-from ..arrays import Array
+from ..arrays import Array, ranges
 from ..meshing.mesh import TET_EDGES, Mesh, boundary_faces
 from ..meshing.quality import shapes
 from .elements import shape_functions, shape_gradients
@@ -198,7 +198,7 @@ class _Grid:
         self._origin, self._size = low.min(axis=0), float(np.median(high - low))
         lower, upper = self._cells(low), self._cells(high)
         self._shape = upper.max(axis=0) + 1
-        box, number = _counted((upper - lower + 1).prod(axis=1))
+        box, number = ranges((upper - lower + 1).prod(axis=1))
         span = (upper - lower + 1)[box]
         offset = np.column_stack(
             [number // (span[:, 1] * span[:, 2]), number // span[:, 2] % span[:, 1], number % span[:, 2]]
@@ -219,14 +219,8 @@ class _Grid:
         on = np.flatnonzero(((cells >= 0) & (cells < self._shape)).all(axis=1))
         keys = self._key(cells[on])
         start, end = (np.searchsorted(self._keys, keys, side=side) for side in ("left", "right"))
-        row, number = _counted(end - start)
-        return on[row], self._boxes[start[row] + number]
-
-
-def _counted(counts: Array) -> tuple[Array, Array]:
-    """Rows repeated by their counts (n,), and the number of each repetition within its row."""
-    row = np.repeat(np.arange(len(counts)), counts)
-    return row, np.arange(len(row)) - np.repeat(np.cumsum(counts) - counts, counts)
+        row, number = ranges(end - start, start)
+        return on[row], self._boxes[number]
 
 
 def _continued(mesh: Mesh, points: Array) -> tuple[Array, Array, Array]:

@@ -19,7 +19,7 @@ from .materials import Materials
 from .model import Model
 from .newton_settings import NewtonSettings
 from .sparsity import Pattern
-from .state import State, extrapolate, rest
+from .state import State, lagrange, rest
 
 if TYPE_CHECKING:
     from .self_contact import SelfContact
@@ -307,7 +307,8 @@ class Equilibrium:
         last = history[-1]
         if len(history) > 1:
             # A polynomial of turning sections leaves what they carry behind.
-            return self.model.following(extrapolate(history, pressure))
+            known = [state.pressure_MPa for state in history], [state.u for state in history]
+            return self.model.following(lagrange(*known, pressure))
         if not self._factorise(last.u, last.pressure_MPa)[0]:
             raise ConvergenceError("the state to start from is unstable")
         with_, without = (

@@ -43,22 +43,16 @@ class State:
         return bool(self.pressure_MPa) or bool(self.u.any())
 
 
-def extrapolate(points: Sequence[State], pressure: float) -> Array:
-    """Displacement (n, 3) in mm at a pressure in MPa, by Lagrange's polynomial through some states.
+def lagrange(places: Sequence[float], values: Sequence[Array], at: float) -> Array:
+    """Value at a place of Lagrange's polynomial through values at some places, arrays of one shape.
 
-    >>> import numpy as np
-    >>> states = [State(p, np.full((1, 3), p**2)) for p in (0.0, 1.0, 2.0)]
-    >>> extrapolate(states, 3.0).tolist()
-    [[9.0, 9.0, 9.0]]
+    >>> lagrange([0.0, 1.0, 2.0], [np.array([0.0]), np.array([1.0]), np.array([4.0])], 3.0).tolist()
+    [9.0]
     """
-    u = np.zeros_like(points[-1].u)
-    for a in points:
-        weight = 1.0
-        for b in points:
-            if a is not b:
-                weight *= (pressure - b.pressure_MPa) / (a.pressure_MPa - b.pressure_MPa)
-        u += weight * a.u
-    return u
+    found = np.zeros_like(values[0])
+    for a, value in zip(places, values, strict=True):
+        found += np.prod([(at - b) / (a - b) for b in places if b != a]) * value
+    return found
 
 
 def rest(mesh: Mesh) -> State:

@@ -15,6 +15,7 @@ import numpy as np
 from ..arrays import Array
 from ..fem.factor import IndefiniteError
 from ..fem.model import Model
+from ..fem.state import lagrange
 from ..meshing.mesh import AXES
 from .octant import part
 from .specimen import Specimen
@@ -119,20 +120,9 @@ def first_loss(
     before, after = strains[low], strains[high]
     for _ in range(_HALVINGS):
         strain = (before + after) / 2
-        found = motions.lost(interpolated(strains[near], moves[near], strain))
+        found = motions.lost(lagrange(strains[near], moves[near], strain))
         if found is None:
             before = strain
         else:
             after, signs = strain, found
     return Loss(before, after, signs)
-
-
-def interpolated(strains: Sequence[float], moves: Sequence[Array], strain: float) -> Array:
-    """Displacement (n, 3) in mm at a strain, of the Lagrange polynomial through some states.
-
-    strains, moves: nominal strain and displacement (n, 3) in mm of each.
-    """
-    u = np.zeros_like(moves[0])
-    for a, move in zip(strains, moves, strict=True):
-        u += np.prod([(strain - b) / (a - b) for b in strains if b != a]) * move
-    return u

@@ -13,7 +13,8 @@ from ..errors import ConvergenceError, InputError
 from ..fem.equilibrium import Equilibrium
 from ..fem.factor import IndefiniteError
 from ..fem.model import Model
-from .buckling import Loss, SymmetryBreakingModes, first_loss, interpolated
+from ..fem.state import lagrange
+from .buckling import Loss, SymmetryBreakingModes, first_loss
 from .specimen import Specimen
 from .stress_strain_curve import Curve
 from .strut_contact import StrutContact, first_strut_contact
@@ -247,7 +248,7 @@ class Plates:
     def _newton(self, history: Sequence[Compressed], strain: float) -> Compressed:
         eq, last = self.equilibrium, history[-1]
         if len(history) > 1:
-            u = interpolated([state.strain for state in history], [state.u for state in history], strain)
+            u = lagrange([state.strain for state in history], [state.u for state in history], strain)
             guess = self._moved(u, strain)
         else:
             guess = self._along_tangent(last, strain)

@@ -13,8 +13,8 @@ from ..errors import ConvergenceError, InputError
 from ..fem.factor import IndefiniteError
 from ..fem.materials import Materials
 from ..fem.self_intersection import crossings
+from ..fem.state import lagrange
 from ..meshing.mesh import AXES, Mesh
-from .buckling import interpolated
 from .octant import Octant, require_factor
 from .stress_strain_curve import Curve
 
@@ -221,8 +221,8 @@ class Stretching:
             du = self._part.solve(-pushed) - solved @ lateral + self._affine @ change
             return last.stretch + change, last.u + du.reshape(last.u.shape)
         strains = [point.strain for point in history]
-        stretch = interpolated(strains, [point.stretch for point in history], strain)
-        u = interpolated(strains, [point.u for point in history], strain)
+        stretch = lagrange(strains, [point.stretch for point in history], strain)
+        u = lagrange(strains, [point.u for point in history], strain)
         # Rounding must not move it, nor the sides off the planes they are on.
         stretch[2] = 1.0 + strain
         return stretch, np.where(self.octant.across, self.octant.mesh.nodes * (stretch - 1.0), u)

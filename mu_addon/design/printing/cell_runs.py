@@ -10,7 +10,7 @@ import attrs
 import numpy as np
 from numpy.typing import NDArray
 
-from ...arrays import connected
+from ...arrays import connected, ranges
 
 Index = NDArray[np.int64]
 
@@ -108,10 +108,7 @@ def meeting(one: Runs, other: Runs, shift: int, reach: int = 0) -> tuple[Index, 
     line = (one.line + shift) * width
     first = np.searchsorted(other.line * width + other.end, line + one.start - reach, side="right")
     last = np.searchsorted(other.line * width + other.start, line + one.end + reach, side="left")
-    count = np.maximum(last - first, 0)
-    owner = np.repeat(np.arange(len(count)), count)
-    begin = np.cumsum(count) - count
-    return owner, np.arange(len(owner)) - np.repeat(begin - first, count)
+    return ranges(np.maximum(last - first, 0), first)
 
 
 @attrs.frozen(eq=False)

@@ -8,6 +8,7 @@ from itertools import pairwise
 import numpy as np
 from numpy.typing import NDArray
 
+from ...arrays import ranges
 from ..surface import Triangles, Vertices
 from .finding import NOWHERE, Points
 
@@ -121,8 +122,8 @@ def _sharing(
     end = np.searchsorted(code, code, side="right")
     partners = np.where(own[owner], end - 1 - np.arange(len(code)), 0)
     for part in _slices(partners):
-        one = np.repeat(np.arange(part.start, part.stop), partners[part])
-        two = one + 1 + _counted(partners[part])
+        one, two = ranges(partners[part], np.arange(part.start, part.stop) + 1)
+        one += part.start
         # A pair meets in every cell both cover; it counts in the one where their common box begins.
         once = (begins[one] | begins[two]) == 7
         yield np.stack([owner[one[once]], owner[two[once]]], axis=1)
@@ -190,17 +191,10 @@ def _covered(
     """Every cell (c, 3) of boxes first..last (m, 3), and the number (c,) of its box."""
     span = last - first + 1
     count = span.prod(axis=1)
-    owner = np.repeat(np.arange(len(first)), count)
-    k = _counted(count)
+    owner, k = ranges(count)
     sx, sy = span[owner, 0], span[owner, 1]
     cell = first[owner] + np.stack([k % sx, k // sx % sy, k // (sx * sy)], axis=1)
     return owner, cell
-
-
-def _counted(count: NDArray[np.int64]) -> NDArray[np.int64]:
-    """0, 1, .. count - 1 for each count, one after the other."""
-    start = np.cumsum(count) - count
-    return np.arange(int(count.sum())) - np.repeat(start, count)
 
 
 def _slices(count: NDArray[np.int64]) -> list[slice]:

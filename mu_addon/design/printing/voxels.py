@@ -9,7 +9,7 @@ import attrs
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from ...arrays import Array
+from ...arrays import Array, ranges
 from ..surface import Triangles, Vertices
 from .cell_runs import Runs
 
@@ -138,9 +138,7 @@ def _crossed(
     """Crossings of the triangles `part`, which meet `count` planes of a whole coordinate `across`."""
     # Coordinates one by one: where a triangle has many planes, reading rows of points takes most of the time.
     x, y, z = (np.ascontiguousarray(points[:, k]) for k in (across, 1 - across, 2))
-    number = np.repeat(np.arange(len(part)), count)
-    first = np.ceil(x).astype(np.int64)[triangles[part]].min(axis=1)
-    plane = np.arange(len(number)) + np.repeat(first - (np.cumsum(count) - count), count)
+    number, plane = ranges(count, np.ceil(x).astype(np.int64)[triangles[part]].min(axis=1))
     low = np.full(len(number), np.inf)
     high = np.full(len(number), -np.inf)
     depth_low, depth_high = np.zeros(len(number)), np.zeros(len(number))
@@ -164,8 +162,7 @@ def _crossed(
         high[to], depth_high[to] = at[right], depth[right]
     begin = np.ceil(low).astype(np.int64)
     met = np.maximum(np.ceil(high).astype(np.int64) - begin, 0)
-    k = np.repeat(np.arange(len(met)), met)
-    at = np.arange(len(k)) + np.repeat(begin - (np.cumsum(met) - met), met)
+    k, at = ranges(met, begin)
     depth = depth_low[k] + (at - low[k]) / (high[k] - low[k]) * (depth_high[k] - depth_low[k])
     cell = np.clip(np.ceil(depth), 0, shape[2]).astype(np.int64)
     layer, row = (plane[k], at) if across == 0 else (at, plane[k])
