@@ -6,7 +6,8 @@ import attrs
 import numpy as np
 
 from ..arrays import Array
-from ..meshing.mesh import AXES, TET_EDGES, Mesh, boundary_faces
+from ..meshing.mesh import AXES, Mesh, boundary_faces
+from .self_intersection import with_middles
 
 
 @attrs.frozen(eq=False)
@@ -67,13 +68,7 @@ def tip_faces(mesh: Mesh) -> tuple[Array, Array, Array]:
     faces, owner = boundary_faces(mesh.tets)
     on_tip = (mesh.nodes[faces][:, :, 2] == height).all(axis=1)
     faces, owner = faces[on_tip], owner[on_tip]
-    if mesh.order == 1:
-        return faces, owner, faces
-    return (
-        faces,
-        owner,
-        np.array([_middles(mesh.tets[e], face) for e, face in zip(owner, faces, strict=True)]),
-    )
+    return faces, owner, faces if mesh.order == 1 else with_middles(faces, mesh.tets[owner])[:, 3:]
 
 
 def _tip_areas(mesh: Mesh, found: tuple[Array, Array, Array] | None = None) -> tuple[Array, Array]:
@@ -92,9 +87,3 @@ def _tip_areas(mesh: Mesh, found: tuple[Array, Array, Array] | None = None) -> t
     np.add.at(weight, carrying, area[:, None] / 3)
     nodes = np.nonzero(weight)[0]
     return nodes, weight[nodes]
-
-
-def _middles(tet: Array, face: Array) -> Array:
-    """Mid-edge nodes (3,) of a face of one ten-node tetrahedron."""
-    inside = np.isin(tet[TET_EDGES], face).all(axis=1)
-    return tet[4:][inside]

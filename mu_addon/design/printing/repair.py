@@ -58,13 +58,7 @@ class Repair:
 
     def plain(self) -> dict[str, Any]:
         """Its figures by name, for a file."""
-        return {
-            "changes": [attrs.asdict(change) for change in self.changes],
-            "largest_move_mm": self.largest_move_mm,
-            "volume_before_mm3": self.volume_before_mm3,
-            "volume_after_mm3": self.volume_after_mm3,
-            "remains": self.remains,
-        }
+        return attrs.asdict(self, filter=attrs.filters.exclude("vertices", "triangles"))
 
     def lines(self) -> list[str]:
         """Repairs done and faults left, a sentence each."""
