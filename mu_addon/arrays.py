@@ -34,3 +34,17 @@ def connected(count: int, one: Array, other: Array) -> Array:
 
     links = coo_matrix((np.ones(len(one), bool), (one, other)), shape=(count, count))
     return np.asarray(connected_components(links, directed=False)[1])
+
+
+def pareto(costs: Array) -> Array:
+    """Numbers of the Pareto-optimal points (n, c): no other is as small in all costs and smaller in one.
+
+    Equal points are all among them; one with a cost that is not finite is not.
+    """
+    finite = np.isfinite(costs).all(axis=1)
+    found = []
+    for number in np.flatnonzero(finite):
+        no_worse = (costs <= costs[number]).all(axis=1) & finite
+        if not (no_worse & (costs < costs[number]).any(axis=1)).any():
+            found.append(number)
+    return np.array(found, dtype=int)

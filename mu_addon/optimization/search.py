@@ -16,7 +16,7 @@ from typing import Any
 import attrs
 import numpy as np
 
-from ..arrays import Array
+from ..arrays import Array, pareto
 from .freedoms import Freedom
 from .settings import BATCH, EVALUATIONS, SEED
 from .surrogate import Surrogate, fit_all
@@ -449,17 +449,3 @@ def _halvings() -> Iterator[float]:
         size = 2**level
         # The odd ones far from each other in turn (van der Corput).
         yield from sorted((k / size for k in range(1, size, 2)), key=lambda a: (a * size // 2) % 4)
-
-
-def pareto(costs: Array) -> Array:
-    """Numbers of the Pareto-optimal points (n, c): no other is as small in all costs and smaller in one.
-
-    Equal points are all among them; one with a cost that is not finite is not.
-    """
-    finite = np.isfinite(costs).all(axis=1)
-    found = []
-    for number in np.flatnonzero(finite):
-        no_worse = (costs <= costs[number]).all(axis=1) & finite
-        if not (no_worse & (costs < costs[number]).any(axis=1)).any():
-            found.append(number)
-    return np.array(found, dtype=int)

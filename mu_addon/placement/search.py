@@ -8,7 +8,7 @@ from typing import Any
 import attrs
 import numpy as np
 
-from ..arrays import Array
+from ..arrays import Array, pareto
 from ..errors import InputError
 
 
@@ -116,11 +116,5 @@ def front(length: Array, deviation_mm: Array) -> Array:
     >>> front(np.array([2.0, 3.0, 4.0]), np.array([0.2, 0.1, 0.4])).tolist()
     [1, 2]
     """
-    order = np.lexsort((deviation_mm, -np.asarray(length)))
-    kept: list[int] = []
-    least = np.inf
-    for i in order:
-        if deviation_mm[i] < least:
-            least = deviation_mm[i]
-            kept.append(int(i))
-    return np.array(kept[::-1], int)
+    found = pareto(np.column_stack([-length, deviation_mm]))
+    return found[np.argsort(length[found], kind="stable")]

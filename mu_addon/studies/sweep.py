@@ -297,7 +297,7 @@ class Sweep(Study):
         """Points that are Pareto-optimal for the objectives."""
         import numpy as np
 
-        from ..optimization.search import pareto
+        from ..arrays import pareto
         from .parameter_study.charts import front_chart
 
         rows = self.rows(points)
