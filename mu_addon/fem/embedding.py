@@ -6,6 +6,7 @@ import attrs
 import numpy as np
 
 from ..arrays import Array, ranges
+from ..design.printing.crossing import covered
 from ..meshing.mesh import TET_EDGES, Mesh, boundary_faces
 from ..meshing.quality import shapes
 from .elements import shape_functions, shape_gradients
@@ -198,12 +199,8 @@ class _Grid:
         self._origin, self._size = low.min(axis=0), float(np.median(high - low))
         lower, upper = self._cells(low), self._cells(high)
         self._shape = upper.max(axis=0) + 1
-        box, number = ranges((upper - lower + 1).prod(axis=1))
-        span = (upper - lower + 1)[box]
-        offset = np.column_stack(
-            [number // (span[:, 1] * span[:, 2]), number // span[:, 2] % span[:, 1], number % span[:, 2]]
-        )
-        keys = self._key(lower[box] + offset)
+        box, cells = covered(lower, upper)
+        keys = self._key(cells)
         order = np.argsort(keys, kind="stable")
         self._keys, self._boxes = keys[order], box[order]
 

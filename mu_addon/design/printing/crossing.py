@@ -113,7 +113,7 @@ def _sharing(
     first: NDArray[np.int64], last: NDArray[np.int64], own: NDArray[np.bool_]
 ) -> Iterator[NDArray[np.int64]]:
     """Pairs (p, 2) of boxes of cells first..last (m, 3) that share a cell, each once; one is `own` (m,)."""
-    owner, cell = _covered(first, last)
+    owner, cell = covered(first, last)
     code = _codes(cell)
     # In a cell its own boxes come first, each before all that it is paired with.
     order = np.lexsort((~own[owner], code)) if not own.all() else np.argsort(code, kind="stable")
@@ -185,9 +185,7 @@ def _through(
     return np.concatenate(found)
 
 
-def _covered(
-    first: NDArray[np.int64], last: NDArray[np.int64]
-) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
+def covered(first: NDArray[np.int64], last: NDArray[np.int64]) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
     """Every cell (c, 3) of boxes first..last (m, 3), and the number (c,) of its box."""
     span = last - first + 1
     count = span.prod(axis=1)
