@@ -18,7 +18,7 @@ if TYPE_CHECKING:
     from .deviation import Deviation, centreline, centreline_deviation, rank
     from .graph import Graph, Limits, lattice_graph
     from .response import Response
-    from .search import Search, SearchSettings, searching
+    from .search import Search, searching
     from .sensitivity_map import Influence, deviation_map, influence_map
 else:
     __getattr__, __dir__, __all__ = public_face(__name__)

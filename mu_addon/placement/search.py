@@ -11,20 +11,9 @@ import numpy as np
 from ..arrays import Array, pareto
 from ..errors import InputError
 
-
-@attrs.frozen
-class SearchSettings:
-    """Numbers of paths to check at first, at most and at a time, and the risk left at the end.
-
-    spread: number of the first checks taken from the whole range of predictions, so that the prediction's
-    error is known there too. risk: a probability, see `probability_of_better`.
-    """
-
-    first: int = 12
-    spread: int = 4
-    batch: int = 4
-    most: int = 100
-    risk: float = 0.05
+# Paths checked at first; of these taken from all predictions, so that their error is known there too; then at
+# a time. The risk left at the end: a probability, see `probability_of_better`.
+FIRST, _SPREAD, _BATCH, _RISK = 12, 4, 4, 0.05
 
 
 @attrs.frozen(eq=False)
@@ -73,22 +62,21 @@ def probability_of_better(predicted_mm: Array, exact_mm: Array) -> float:
 
 
 def searching(
-    predicted_mm: Array, settings: SearchSettings | None = None, J_mm: Callable[[Any], float] = float
+    predicted_mm: Array, most: int = 100, J_mm: Callable[[Any], float] = float
 ) -> Generator[list[int], Sequence[Any], Search]:
     """Yield numbers of paths to solve, get the solution of each, and return the search.
 
-    predicted_mm (n,): positive predictions of J_hat. J_mm: of a solution, its exact J_hat in mm, NaN of a
-    path that is impossible and left out. Raises InputError where a prediction is not positive or no path is
-    possible.
+    predicted_mm (n,): positive predictions of J_hat; most: paths to solve. J_mm: of a solution, its exact
+    J_hat in mm, NaN of a path that is impossible and left out. Raises InputError where a prediction is not
+    positive or no path is possible.
     """
-    s = settings or SearchSettings()
     predicted_mm = np.asarray(predicted_mm, float)
     if not len(predicted_mm) or not (predicted_mm > 0).all():
         raise InputError("there is no path, or one with a predicted deviation of zero", "search")
     order = np.argsort(predicted_mm, kind="stable")
-    across = np.linspace(0, len(order) - 1, s.spread + 2).astype(int)[1:-1]
+    across = np.linspace(0, len(order) - 1, _SPREAD + 2).astype(int)[1:-1]
     # Two at least, or there is no error to speak of.
-    now = np.unique(np.append(order[: max(s.first - s.spread, 2)], order[across]))
+    now = np.unique(np.append(order[: max(FIRST - _SPREAD, 2)], order[across]))
     exact = np.full(len(order), np.nan)
     possible = np.ones(len(order), bool)
     while True:
@@ -101,10 +89,10 @@ def searching(
             if not checked:
                 raise InputError("none of the paths is possible", "search", "allow other paths")
             risk = probability_of_better(predicted_mm[possible], exact[possible])
-            if risk <= s.risk or checked >= s.most:
+            if risk <= _RISK or checked >= most:
                 out = np.flatnonzero(~possible)
-                return Search(predicted_mm, exact, int(np.nanargmin(exact)), risk, risk <= s.risk, out)
-        now = left[: min(s.batch, s.most - checked)]
+                return Search(predicted_mm, exact, int(np.nanargmin(exact)), risk, risk <= _RISK, out)
+        now = left[: min(_BATCH, most - checked)]
 
 
 def front(length: Array, deviation_mm: Array) -> Array:

@@ -22,7 +22,7 @@ from ..meshing.mesh import Mesh
 from ..placement.candidates import Candidate
 from ..placement.elimination import Contest
 from ..placement.graph import Limits
-from ..placement.search import Search, SearchSettings, searching
+from ..placement.search import Search, searching
 from ..report.results import LatticePath, Signals
 from ..run.cache import Cache
 from .candidates import (
@@ -248,7 +248,7 @@ class CheckedPath:
 
 def checked_paths(found: Predicted, most: int) -> Generator[list[int], Sequence[CheckedPath], Search]:
     """Yield numbers of paths to solve, get them, and return the search's outcome."""
-    return searching(found.J_mm, SearchSettings(most=most), lambda one: one.J_mm)
+    return searching(found.J_mm, most, lambda one: one.J_mm)
 
 
 def whole_motion(motion: Trajectory) -> Trajectory:

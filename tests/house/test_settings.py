@@ -42,7 +42,6 @@ OTHERWISE = {
     "graph/evaluation.py": {"seconds"},  # that a node took
     "measured/experiment.py": {"orientation_deg", "specimen"},
     "optimization/unit_body.py": {"self_contact"},
-    "placement/search.py": {"batch"},  # of paths
     "sensing/calibration.py": {"dark"},  # subtracted already
     "studies/unit_motion.py": {"self_contact"},  # of a call, which may be quick
     "studies/parameter_study/point.py": {"memory_MB", "seconds"},  # that a study took

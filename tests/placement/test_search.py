@@ -5,11 +5,11 @@ import pytest
 
 from mu_addon.errors import InputError
 from mu_addon.generators import value_of
-from mu_addon.placement.search import SearchSettings, front, probability_of_better, searching
+from mu_addon.placement.search import FIRST, front, probability_of_better, searching
 
 
-def search_paths(predicted_mm, check, settings=None):
-    return value_of(searching(predicted_mm, settings), check)
+def search_paths(predicted_mm, check, most=100):
+    return value_of(searching(predicted_mm, most), check)
 
 
 def test_a_perfect_prediction_needs_only_the_first_checks():
@@ -17,13 +17,13 @@ def test_a_perfect_prediction_needs_only_the_first_checks():
     outcome = search_paths(J, lambda numbers: J[numbers] * 1.3)
     assert outcome.best == 0
     assert outcome.complete
-    assert len(outcome.checked) == SearchSettings().first
+    assert len(outcome.checked) == FIRST
 
 
 def test_a_useless_prediction_is_admitted():
     rng = np.random.default_rng(0)
     J = rng.uniform(1.0, 2.0, 300)
-    outcome = search_paths(np.ones(300), lambda numbers: J[numbers], SearchSettings(most=40))
+    outcome = search_paths(np.ones(300), lambda numbers: J[numbers], 40)
     assert not outcome.complete
     assert outcome.risk > 0.05
     assert len(outcome.checked) == 40
@@ -44,7 +44,7 @@ def test_the_risk_holds_over_many_searches():
 def test_everything_checked_leaves_no_risk():
     J = np.array([0.3, 0.1, 0.2])
     assert probability_of_better(np.ones(3), J) == 0.0
-    outcome = search_paths(np.ones(3), lambda numbers: J[numbers], SearchSettings(risk=0.0))
+    outcome = search_paths(np.ones(3), lambda numbers: J[numbers])
     assert outcome.complete
     assert outcome.best == 1
 
