@@ -31,7 +31,10 @@ def weld(vertices: Vertices, triangles: Triangles, quantum: float) -> tuple[Vert
     grid, index = _unique_rows(np.rint(vertices / quantum).astype(np.int64))
     faces = index[triangles]
     distinct = (faces != np.roll(faces, 1, axis=1)).all(axis=1)
-    faces = _cancelled(_rotated(faces[distinct]))
+    faces = faces[distinct]
+    # The smallest index first.
+    turned = (np.argmin(faces, axis=1)[:, None] + np.arange(3)) % 3
+    faces = _cancelled(np.take_along_axis(faces, turned, axis=1))
     used, index = np.unique(faces, return_inverse=True)
     faces = index.reshape(-1, 3)
     return grid[used] * quantum, faces[np.lexsort(faces.T[::-1])]
@@ -127,11 +130,6 @@ def stl_surface(content: bytes) -> tuple[Vertices, Triangles]:
     with np.errstate(invalid="ignore"):
         vertices, index = _unique_rows(corners.astype(float))
     return vertices, index.reshape(-1, 3)
-
-
-def _rotated(faces: Triangles) -> Triangles:
-    """Triangles with the smallest index first, orientation kept."""
-    return np.take_along_axis(faces, (np.argmin(faces, axis=1)[:, None] + np.arange(3)) % 3, axis=1)
 
 
 def _cancelled(faces: Triangles) -> Triangles:

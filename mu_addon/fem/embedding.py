@@ -92,7 +92,8 @@ def embed(mesh: Mesh, points: Array) -> Embedding:
     weights[inside] = shape_functions(_barycentric(local[inside]), mesh.order)
     out = np.flatnonzero(~inside)
     if len(out):
-        element[out], weights[out], distance[out] = _continued(mesh, points[out])
+        element[out], at, held, distance[out] = _nearest(mesh, points[out])
+        weights[out] = _weights(mesh.nodes[mesh.tets[element[out]]], at, held, points[out])
     return Embedding(mesh.tets[element], weights, distance, mirrored)
 
 
@@ -218,12 +219,6 @@ class _Grid:
         start, end = (np.searchsorted(self._keys, keys, side=side) for side in ("left", "right"))
         row, number = ranges(end - start, start)
         return on[row], self._boxes[number]
-
-
-def _continued(mesh: Mesh, points: Array) -> tuple[Array, Array, Array]:
-    """Elements (p,), weights (p, n) and distances (p,) in mm of points outside a mesh."""
-    element, at, held, away = _nearest(mesh, points)
-    return element, _weights(mesh.nodes[mesh.tets[element]], at, held, points), away
 
 
 def _weights(nodes: Array, at: Array, held: Array, points: Array) -> Array:

@@ -48,15 +48,11 @@ def materials_of(unit: Unit, mesh: Mesh) -> Materials:
     return Materials(tuple(Layer(f.law, f.elements, f.parameters, f.weight * stiffer) for f in layers))
 
 
-def _walls(unit: Unit, mesh: Mesh) -> Array:
-    """Thickness (m,) in mm of the printed wall at the height of each element."""
-    return unit.printed.wall_at(mesh.nodes[mesh.tets[:, :4], 2].mean(axis=1))[0]
-
-
 def _skin_stiffening(unit: Unit, mesh: Mesh) -> Array:
     """Modulus (m,) of each element of a resolved mesh over the core's, by the skin's share of its volume."""
     p, d = unit.print, unit.printed
-    found = skin_stiffening(_walls(unit, mesh), p.skin_depth_mm, p.skin_factor)
+    walls, _ = d.wall_at(mesh.nodes[mesh.tets[:, :4], 2].mean(axis=1))
+    found = skin_stiffening(walls, p.skin_depth_mm, p.skin_factor)
     if p.skin_depth_mm == 0.0 or p.skin_factor == 1.0:
         return found
     struts = np.flatnonzero(mesh.region == LATTICE)

@@ -66,7 +66,9 @@ def modulus(curve: Curve, procedure: str = DEFAULT) -> float:
             f"modulus by {procedure!r}",
             "compress further or choose another procedure",
         )
-    return _secant(strain, stress, reach) if "secant" in procedure else _slope(strain, stress, reach)
+    if "secant" in procedure:
+        return float(_sampled(strain, stress, np.array([reach]))[0] / reach)
+    return _slope(strain, stress, reach)
 
 
 def moduli(curve: Curve) -> dict[str, float]:
@@ -103,7 +105,3 @@ def _slope(strain: Array, stress: Array, reach: float) -> float:
     at = np.linspace(0.0, reach, _RAMP)
     values = _sampled(strain, stress, at)
     return float(((at - at.mean()) * values).sum() / ((at - at.mean()) ** 2).sum())
-
-
-def _secant(strain: Array, stress: Array, reach: float) -> float:
-    return float(_sampled(strain, stress, np.array([reach]))[0] / reach)
