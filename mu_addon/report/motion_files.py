@@ -6,7 +6,8 @@ Written as the study finds them, in single precision, and read again by whatever
   and `REGION_cut` (t,), whether a triangle lies in the mirror plane of a half mesh
 - model_a.npz: `time_s`, `pressure_kPa` and `state`, (k,) each, at the protocol's samples; `state_kPa` (s,),
   `displacement_mm` (s, n, 3) and, at the surfaces, `REGION_FIELD` (s, v); with self-contact
-  `REGION_contact_pressure_kPa` (s, v) as well
+  `REGION_contact_pressure_kPa` (s, v) as well. While states are missing also `reached` (k,), False at samples
+  without their own state, which have that of the nearest one in time
 - NAME.npz, of a sensor path: `state_kPa` (r,), and differences from Model A: `difference_mm` (r, n, 3) and
   `REGION_FIELD` (r, v); of a path off the mirror plane of a half mesh also those of the nodes' images,
   reflected into that half, `image_mm` and `image_REGION_FIELD`
@@ -100,7 +101,7 @@ class Motion:
 
     fields: by region and name, (s, v), with the pressure of self-contact where that was simulated;
     sensitivity: by region, (v,), empty where there is none; paths: names of the sensor paths whose motion is
-    there.
+    there; reached: (k,), False at samples whose state was not solved yet.
     """
 
     folder: Path
@@ -114,6 +115,13 @@ class Motion:
     fields: dict[str, dict[str, Array]]
     sensitivity: dict[str, Array]
     paths: tuple[str, ...]
+    reached: Array
+
+    @property
+    def so_far(self) -> str:
+        """How many pressures are solved of a motion that lacks some, as text; empty for a whole one."""
+        every, missing = ({*kPa.tolist()} for kPa in (self.pressure_kPa, self.pressure_kPa[~self.reached]))
+        return f"{len(every - missing)} of {len(every)} pressures so far" if missing else ""
 
     @property
     def halved(self) -> bool:
@@ -212,6 +220,11 @@ class Motion:
         first = min(int(place), len(self.time_s) - 2)
         return int(self.state[first]), int(self.state[first + 1]), float(place - first)
 
+    def is_reached(self, time_s: float) -> bool:
+        """Return True if the states on either side of a time are solved."""
+        place = np.interp(time_s, self.time_s, np.arange(len(self.time_s)))
+        return bool(self.reached[[int(place), int(np.ceil(place))]].all())
+
 
 def write_model_a(
     folder: Path,
@@ -222,14 +235,16 @@ def write_model_a(
     contact_kPa: Sequence[Array] = (),
     fields: dict[str, Array] | None = None,
     surfaces: dict[str, Surface] | None = None,
+    reached: Array | None = None,
 ) -> list[dict[str, Array]]:
-    """Write mesh.npz and model_a.npz of a finished Model A into `folder`/motion. Raises OutputError.
+    """Write mesh.npz and model_a.npz of Model A into `folder`/motion. Raises OutputError.
 
     Returns of every state the fields (m,) of the elements by name, none where `fields` are given.
 
     history: of materials with memory in a state, by its number; contact_kPa: of every state the pressure (n,)
     at the mesh's nodes where the unit touches itself, or none without self-contact. fields: as
     `SurfaceFields.of_states` gives them, of all states or none, and surfaces, both computed where left out.
+    reached: see `Motion`; all samples without.
     """
     arrays = {f.name: getattr(mesh, f.name) for f in attrs.fields(Mesh)}
     arrays["symmetry"] = np.array(mesh.symmetry, dtype="U1")
@@ -252,6 +267,7 @@ def write_model_a(
             "state": trajectory.index,
             "state_kPa": np.array([s.pressure_kPa for s in trajectory.solved]),
             "displacement_mm": np.array([s.u for s in trajectory.solved], np.float32),
+            **({} if reached is None else {"reached": reached}),
             **found,
         },
         packed=False,
@@ -384,6 +400,7 @@ def _motion(
             r: sensitivity[f"{r}_{SENSITIVITY}"] for r in REGIONS if f"{r}_{SENSITIVITY}" in sensitivity
         },
         paths=tuple(sorted(names, key=lambda name: (len(name), name))),
+        reached=model.get("reached", np.ones(len(model["time_s"]), bool)),
     )
 
 
@@ -398,7 +415,7 @@ def _fits(m: Motion) -> bool:
     """Return True if all numbers of nodes, vertices and states are in range and all shapes agree."""
     states, nodes = len(m.state_kPa), len(m.mesh.nodes)
     fits = m.model_a.shape == (states, nodes, 3) and m.state.max(initial=0) < states
-    fits = fits and len(m.time_s) == len(m.state) == len(m.pressure_kPa) > 1
+    fits = fits and len(m.time_s) == len(m.state) == len(m.pressure_kPa) == len(m.reached) > 1
     for region, surface in m.surfaces.items():
         count = len(surface.node)
         fits = fits and surface.node.max(initial=0) < nodes and surface.triangles.max(initial=-1) < count

@@ -71,7 +71,7 @@ if TYPE_CHECKING:
     from .shown_motion import finished_motion_parts as finished_motion_parts
     from .shown_motion import motion_parts as motion_parts
     from .shown_motion import parameter_table as parameter_table
-    from .shown_motion import states_file as states_file
+    from .shown_motion import unfinished_motion_parts as unfinished_motion_parts
     from .shown_ranking import answer_parts as answer_parts
     from .shown_ranking import contest_doubts as contest_doubts
     from .shown_ranking import estimate_parts as estimate_parts

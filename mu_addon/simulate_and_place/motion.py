@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
+from functools import lru_cache
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
+from weakref import WeakKeyDictionary
 
 import attrs
 import numpy as np
@@ -52,9 +54,14 @@ def state_after(equilibrium: Equilibrium, pressure_kPa: float, earlier: Sequence
     return equilibrium.reach(in_MPa(pressure_kPa), list(earlier) or [equilibrium.at_zero_pressure()])
 
 
+@lru_cache(maxsize=1)
+def _at_rest(mesh: Mesh) -> State:
+    return rest(mesh)
+
+
 def motion_of(mesh: Mesh, samples: Samples, states: Mapping[float, State]) -> Trajectory:
     """Motion through a protocol of the states at its distinct pressures in kPa; at 0 without one, rest."""
-    solved = tuple(states[p] if p in states else rest(mesh) for p in samples.distinct_kPa)
+    solved = tuple(states[p] if p in states else _at_rest(mesh) for p in samples.distinct_kPa)
     index = np.searchsorted(samples.distinct_kPa, samples.pressure_kPa)
     return Trajectory(samples.time_s, samples.pressure_kPa, solved, index, mesh)
 
@@ -77,7 +84,7 @@ def reached_of(
     if instants is not None:
         return Reached.of(samples, instants.states, by_instant=True, in_time=True)
     found = list((states or {}).values())
-    start = [] if has_gravity or not found else [rest(mesh)]
+    start = [] if has_gravity or not found else [_at_rest(mesh)]
     return Reached.of(samples, [*start, *found], by_instant=False, in_time=has_history)
 
 
@@ -114,15 +121,31 @@ class StateFields:
     itself: SelfContact
 
 
+_LOOKED: WeakKeyDictionary[State, StateFields] = WeakKeyDictionary()
+"""Fields of a state, found once: those that are shown while others are missing are shown again later."""
+
+
 def state_fields(mechanics: Mechanics, motion: Trajectory, instants: InTime | None) -> StateFields:
     """Stress, stretch and contact of every state; instants: of a motion with history."""
     mesh, surfaces = motion.mesh, surfaces_of(motion.mesh)
-    looked = SurfaceFields(mesh, {name: one.node for name, one in surfaces.items()})
-    of_elements: list[dict[str, Array]] = []
     remembered = instants.remembered if instants and mechanics.unit.wall.has_memory else ()
-
-    def history(number: int) -> Sequence[Array]:
-        return remembered[number] if remembered else ()
-
-    surface = looked.of_states([s.u for s in motion.solved], mechanics.materials(mesh), history, of_elements)
-    return StateFields(surfaces, surface, tuple(of_elements), self_contact_of(mechanics, mesh, motion.solved))
+    new = [number for number, state in enumerate(motion.solved) if state not in _LOOKED]
+    if new:
+        looked = SurfaceFields(mesh, {name: one.node for name, one in surfaces.items()})
+        states, materials = [motion.solved[number] for number in new], mechanics.materials(mesh)
+        itself = self_contact_of(mechanics, mesh, states)
+        for at, (number, state) in enumerate(zip(new, states, strict=True)):
+            history, of_elements = [remembered[number] if remembered else ()], list[dict[str, Array]]()
+            surface = looked.of_states([state.u], materials, history.__getitem__, of_elements)
+            own = SelfContact(itself.rows[at : at + 1], itself.pressure_kPa[at : at + 1])
+            _LOOKED[state] = StateFields(surfaces, surface, tuple(of_elements), own)
+    found = [_LOOKED[state] for state in motion.solved]
+    return StateFields(
+        surfaces,
+        {name: np.concatenate([one.surface[name] for one in found]) for name in found[0].surface},
+        tuple(values for one in found for values in one.of_elements),
+        SelfContact(
+            tuple(row for one in found for row in one.itself.rows),
+            tuple(pressure for one in found for pressure in one.itself.pressure_kPa),
+        ),
+    )

@@ -59,6 +59,10 @@ def difference(one: Motion, name: str, skin: Skin, other: Motion, other_name: st
 
 def _states(one: Motion, other: Motion) -> Array:
     """State (s,) of another run at the time of each state of one."""
+    if words := one.so_far or other.so_far:
+        raise InputError(
+            f"a motion is not whole: {words}", str(other.folder.parent), "compare runs that are complete"
+        )
     same = len(one.time_s) == len(other.time_s)
     if not same or not (
         np.allclose(one.time_s, other.time_s) and np.allclose(one.pressure_kPa, other.pressure_kPa)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -29,7 +29,7 @@ from ..report.vtk import write_mesh, write_trajectory
 from ..run.parts import Beside, Chart, File, Part, Pictures, Sentence, Table, Warn, csv, listed, recorded
 from .charts import ANGLE, angle_picture
 from .model_a import InTime
-from .motion import MotionTables, StateFields
+from .motion import MotionTables, StateFields, state_fields
 from .motion_checks import snaps, walls_cross, would_tear
 from .motion_tables import Reached
 from .named_effects import parameters_of
@@ -98,13 +98,48 @@ def states_file(
     mesh: Mesh, instants: Sequence[tuple[float, State]], fields: StateFields | None = None
 ) -> File:
     """model_a.pvd: states with their times in s for ParaView; fields: of each state, in order."""
-    every = {id(s): s for _, s in instants}
+    every = [*dict.fromkeys(state for _, state in instants)]
     of = {} if fields is None else dict(zip(every, fields.of_elements, strict=True))
 
     def write(path: Path) -> None:
-        write_trajectory(path, mesh, instants, lambda state: of.get(id(state), {}))
+        write_trajectory(path, mesh, instants, lambda state: of.get(state, {}))
 
-    return File("model_a.pvd", write, of=(fields is None, *(s.u for s in every.values())))
+    return File("model_a.pvd", write, of=(fields is None, *(s.u for s in every)))
+
+
+def unfinished_motion_parts(
+    study: Any, mesh: Mesh, reached: Reached, instants: InTime | None
+) -> Iterator[Part]:
+    """Files of the states that there are: what is seen at other instants is the nearest one in time."""
+    times, _, states = zip(*reached.instants, strict=True)
+    yield states_file(mesh, list(zip(times, states, strict=True)))
+    samples, solved = study.samples, tuple(dict.fromkeys(states))
+    nearest = np.abs(samples.time_s[:, None] - np.array(times)).argmin(axis=1)
+    index = np.array([solved.index(states[n]) for n in nearest])
+    motion = Trajectory(samples.time_s, samples.supplied_kPa, solved, index, mesh)
+    fields = partial(state_fields, study.mechanics, motion, instants)
+    yield _display_file(study, motion, fields, np.isin(samples.time_s, times))
+
+
+def _display_file(
+    study: Any, motion: Trajectory, fields: Callable[[], StateFields], reached: Array | None = None
+) -> File:
+    """The folder `motion`; reached: of a motion without all of its states, see `report.motion_files`."""
+
+    def write(path: Path) -> None:
+        found = fields()
+        write_model_a(
+            path.parent,
+            motion.mesh,
+            study.mechanics.materials(motion.mesh),
+            motion,
+            contact_kPa=found.itself.pressure_kPa,
+            fields=found.surface,
+            surfaces=found.surfaces,
+            reached=reached,
+        )
+
+    return File(FOLDER, write, of=(reached is None, *(state.u for state in motion.solved)))
 
 
 def finished_motion_parts(
@@ -117,24 +152,10 @@ def finished_motion_parts(
     """Files, tables and doubts of a whole motion."""
     mesh, states = motion.mesh, motion.solved
     supplied = attrs.evolve(motion, pressure_kPa=study.samples.supplied_kPa)
-    content = [s.u for s in states]
-
-    def write(path: Path) -> None:
-        write_model_a(
-            path.parent,
-            mesh,
-            study.mechanics.materials(mesh),
-            supplied,
-            contact_kPa=fields.itself.pressure_kPa,
-            fields=fields.surface,
-            surfaces=fields.surfaces,
-        )
-
-    yield File(FOLDER, write, of=content)
-    of = dict(zip(map(id, states), fields.of_elements, strict=True))
+    yield _display_file(study, supplied, lambda: fields)
+    of = dict(zip(states, fields.of_elements, strict=True))
     instants_shown = list(zip(motion.time_s.tolist(), motion.states, strict=True))
-    order = dict.fromkeys(id(state) for state in motion.states)
-    shown = attrs.evolve(fields, of_elements=tuple(of[one] for one in order))
+    shown = attrs.evolve(fields, of_elements=tuple(of[one] for one in dict.fromkeys(motion.states)))
     yield states_file(mesh, instants_shown, shown)
     yield csv("stretch.csv", STRETCH_COLUMNS, tables.stretch)
     most = nearest_to_break(tables.stretch)

@@ -468,7 +468,7 @@ class UnitMotion(Study):
         shown = ", ".join(f"{round(a, 1) + 0.0:+.1f} deg at {p:g} kPa" for p, a in (ends[0], ends[-1]))
         yield Sentence(f"angle: {shown}", terminal=True, page=False)
         if not (states or instants).complete:  # type: ignore[union-attr]
-            yield core.states_file(meshed, [(t, state) for t, _, state in reached.instants])
+            yield from core.unfinished_motion_parts(self, meshed, reached, instants)
         yield from core.motion_parts(self, meshed, reached)
 
     def reached(

@@ -3,6 +3,7 @@
 import functools
 import json
 import os
+from types import SimpleNamespace
 
 import attrs
 import numpy as np
@@ -14,6 +15,9 @@ from mu_addon.fem.trajectory import Trajectory
 from mu_addon.fem.unit_materials import materials_of
 from mu_addon.meshing.settings import MeshSettings
 from mu_addon.report.motion_files import write_model_a
+from mu_addon.simulate_and_place import unfinished_motion_parts
+from mu_addon.simulate_and_place.mechanics import Samples
+from mu_addon.simulate_and_place.motion_tables import Reached
 from mu_addon.studies import unit_runs
 from mu_addon.studies.starting import write_study
 from mu_addon.studies.unit_ranking import UnitStudy
@@ -41,6 +45,18 @@ def write_bent_motion(folder, angles=ANGLES, pressures=PRESSURES, unit=UNIT, ref
     trajectory = Trajectory(index.astype(float), np.asarray(pressures), states, index, mesh)
     write_model_a(folder, mesh, materials_of(unit, mesh), trajectory)
     return mesh
+
+
+def write_bent_part(folder, solved_kPa):
+    """Write `folder`/motion as a run does that has solved some of these pressures."""
+    mesh, times = coarse_mesh(UNIT, 0.2), np.arange(len(PRESSURES), dtype=float)
+    samples = Samples(times, PRESSURES, PRESSURES)
+    known = dict(zip(PRESSURES.tolist(), ANGLES, strict=True))
+    states = [State(pressure_MPa=p / 1e3, u=bent(mesh, known[p])) for p in (0.0, *solved_kPa)]
+    reached = Reached.of(samples, states, by_instant=False, in_time=False)
+    study = SimpleNamespace(samples=samples, mechanics=UnitStudy(unit=UNIT).mechanics)
+    for file in unfinished_motion_parts(study, mesh, reached, None):
+        file.make(folder / file.name)
 
 
 def write_bent_run(home, at_s, wall_mm=0.9, more=1.0, full=False, ranked=True):

@@ -20,6 +20,7 @@ from mu_addon.fem.unit_materials import materials_of
 from mu_addon.files import write_npz
 from mu_addon.meshing.mesh import mirror
 from mu_addon.meshing.quality import element_volumes
+from mu_addon.meshing.settings import MeshSettings
 from mu_addon.placement.candidates import Candidate, candidate_paths
 from mu_addon.report.motion_files import (
     FIELDS,
@@ -46,6 +47,36 @@ PRESSURES = np.array([0.0, -10.0, 0.0, 10.0, 20.0])
 TIMES = np.arange(5.0)
 ANCHORS = anchor_points(UNIT)
 PATHS = candidate_paths(ANCHORS, windows(4))
+
+
+def test_states_can_be_looked_at_before_the_motion_is_whole(tmp_path, monkeypatch):
+    seen, solved_state = [], made_up.state
+
+    def watched(mesh, pressure_MPa, more=1.0):
+        seen.extend([read_motion(tmp_path)] if (tmp_path / "motion").is_dir() else [])
+        return solved_state(mesh, pressure_MPa, more)
+
+    monkeypatch.setattr(made_up, "state", watched)
+    monkeypatch.setattr("mu_addon.run.execution.KEEP_EVERY_S", 0.0)
+    job = UnitStudy(
+        unit=UNIT, mesh=MeshSettings(refine=0.2), times=7, self_contact=True, stages=("design", "simulate")
+    )
+    made_up.place(tmp_path, job)
+    whole = read_motion(tmp_path)
+    assert whole.pressure_kPa.tolist() == [0.0, -20.0, 0.0, 20.0, 40.0, 20.0, 0.0]
+    assert [one.so_far for one in (*seen, whole)] == [
+        "2 of 4 pressures so far",
+        "3 of 4 pressures so far",
+        "",
+    ]
+    assert [one.is_reached(7.0) for one in seen] == [False, True], "between 20 and 40 kPa"
+    assert not any(one.is_reached(time) for one in seen for time in (1.0, 2.0, 3.9))
+    for one in (*seen, whole):
+        at = one.reached
+        assert one.fields["membrane"].keys() == whole.fields["membrane"].keys()
+        for own, every in ((one.model_a, whole.model_a), *((one.fields[r][f], whole.fields[r][f])
+                           for r in REGIONS for f in whole.fields[r])):  # fmt: skip
+            np.testing.assert_array_equal(own[one.state][at], every[whole.state][at])
 
 
 @pytest.fixture(scope="module")

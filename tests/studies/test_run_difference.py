@@ -39,6 +39,14 @@ def test_on_one_mesh_it_is_that_of_the_nodes(runs, region):
     assert not difference(own, MODEL_A, skin, own, MODEL_A).distance_mm.any()
 
 
+def test_a_motion_that_lacks_states_is_compared_with_none(runs):
+    own = runs["own"]
+    partial = attrs.evolve(own, reached=np.array(PRESSURES) < 30.0)
+    for one, other in ((own, partial), (partial, own)):
+        with pytest.raises(InputError, match="not whole: 5 of 7 pressures so far"):
+            difference(one, MODEL_A, own.skin("membrane", cut=False), other, MODEL_A)
+
+
 @pytest.mark.parametrize("region", ["membrane", "lattice"])
 def test_on_two_meshes_points_of_one_go_along_with_the_other(runs, region):
     own, finer = runs["own"], runs["finer"]

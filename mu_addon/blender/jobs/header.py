@@ -155,5 +155,6 @@ def _notice(layout, job: start_child.Job) -> None:
 
 @handler("load_post")
 def _loaded(*_):
-    # They were of another file.
-    start_child.hush()
+    # They were of another file; their panels still tell.
+    for job in start_child.ended():
+        job.title = ""

@@ -7,7 +7,6 @@ unlocked takes over its jobs, running or ended.
 from __future__ import annotations
 
 import shutil
-import time
 import uuid
 from collections.abc import Iterator
 from contextlib import suppress
@@ -112,8 +111,3 @@ def close(leaves: bool) -> None:
     _own = None
     if not leaves:
         shutil.rmtree(folder, ignore_errors=True)
-
-
-def now_s() -> float:
-    """Seconds since the epoch: other sessions' clocks have no other origin in common."""
-    return time.time()

@@ -68,8 +68,8 @@ PACKAGE = __package__.rpartition(".blender")[0]
 OWN_FOLDER = "blender"
 """Folder within a run's folder for files that the child adds to its outputs."""
 
-JOB_ENDED = Signal()
-"""Sent with the key of a job that has ended."""
+JOB_ENDED, JOB_NEWS = Signal(), Signal()
+"""Sent with the key of a job that has ended, or has said something."""
 
 
 @attrs.define(eq=False)
@@ -172,7 +172,7 @@ class JobKind:
         child = start(["resume", str(folder), "--json", *options], folder, plan=plan, waits=waits)
         title, lasts = f"{root.name}: {self.title}", self.heavy or self.outlives
         if lasts:
-            record = lasting_jobs.Record(key, title, folder, lasting_jobs.now_s(), tuple(plan), self.heavy)
+            record = lasting_jobs.Record(key, title, folder, time.time(), tuple(plan), self.heavy)
             lasting_jobs.keep(record)
         return watch(key, child, title, self.heavy, lasts)
 
@@ -207,12 +207,6 @@ def ended() -> list[Job]:
     return [job for job in _jobs.values() if job.title and not job.runs]
 
 
-def hush() -> None:
-    """Drop the notices of ended jobs; their panels still tell."""
-    for job in ended():
-        job.title = ""
-
-
 def _wanted() -> bool:
     """Return True if the user lets jobs outlive Blender; False without preferences, as in a script."""
     extension = bpy.context.preferences.addons.get(PACKAGE)
@@ -236,8 +230,10 @@ def watch(key: str, child: Child, title: str = "", heavy: bool = False, lasts: b
 
 def poll() -> bool:
     """Read the new output of every child; return True if there was any."""
-    news = [job.child.poll() for job in _jobs.values()]
-    return _begin_next() or any(news)
+    news = [job.key for job in _jobs.values() if job.child.poll()]
+    for key in news:
+        JOB_NEWS.send(key)
+    return _begin_next() or bool(news)
 
 
 def _begin_next() -> bool:

@@ -93,7 +93,9 @@ def lines(root: Any, motion: Any, scene: Any) -> list[str]:
     if field.name == motion_parts.DIFFERENCE and other is not None:
         itself = other.folder == motion.folder.parent
         found.append("the run compared with itself" if itself else f"to the run {other.title}")
-    found.append(motion_parts.moment(motion, scene))
+    known = motion.is_reached(time)
+    found.append(motion_parts.moment(motion, scene) + ("" if known else ": not solved yet"))
+    found += [motion.so_far] if motion.so_far else []
     for contact in studies.contact_forces(root):
         force = float(np.interp(time, contact.time_s, contact.force_N))
         found.append(f"{contact.name}: {force:.2f} N")

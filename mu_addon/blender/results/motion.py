@@ -8,6 +8,7 @@ path or model_a and BODY one of `REGIONS` or `PRINT`; and `mu_run`, its run.
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
@@ -26,7 +27,7 @@ from ...report.motion_files import (
 )
 from ...report.pc2 import read_pc2, write_pc2
 from ..jobs.prepared import NotPrepared
-from ..jobs.start_child import JOB_ENDED
+from ..jobs.start_child import JOB_ENDED, JOB_NEWS
 from ..preview import skeletons
 from ..printing.state import solid_of
 from ..shared import displays, timeline, updates, viewports
@@ -35,6 +36,7 @@ from ..shared.registration import at_end, connected, handler
 from ..shared.updates import Signal
 from ..shared.wording import path_symbol
 from ..simulate import study_folder as studies
+from ..simulate.job import SIMULATION
 from ..unit import object as unit_object
 from ..unit.properties import VIEW_CHANGED, to_unit
 from . import field_colours, run_motions
@@ -45,7 +47,8 @@ MESH = "mesh"
 """The analysis mesh: both its regions."""
 DISPLACEMENT, DEVIATION = "displacement_mm", "deviation_mm"
 DIFFERENCE = "run_difference_mm"
-RUN = "mu_run"
+RUN, REACHED = "mu_run", "mu_reached"
+"""Of a shown object: its run, and how many samples of the protocol had their state."""
 
 
 @attrs.frozen(eq=False)
@@ -59,6 +62,8 @@ class Played:
 COLOURED = Signal()
 """Sent with the root whose motion was recoloured."""
 
+_peaks: dict[str, int] = {}
+"""Frame of the field's largest value that was gone to, by UUID of the unit."""
 _played: dict[tuple[Path, str, bool], Played] = {}
 """By folder, motion and cut, without the printed bodies, which have `_prints`."""
 
@@ -130,30 +135,46 @@ def rebuild(root: Any) -> None:
 
 @connected(unit_object.REBUILT)
 def follow(root: Any) -> None:
-    """Update the shown motions to the shown run, after a change of parameters, run or choice.
+    """Update the shown motions to the shown run, after a change of parameters, run, choice or states.
 
-    A motion that this run lacks is removed, and the panel reports it.
+    A motion that this run lacks is removed, and the panel reports it. A view of the largest value stays one.
     """
     studies.remember(root)
-    key, wrong = root.mu_unit.study.run, ""
-    if all(part.get(RUN, key) == key for part in parts(root)):
+    key, motion, wrong = root.mu_unit.study.run, motion_of(root), ""
+    same = all(part.get(RUN, key) == key for part in parts(root))
+    if same and not any(_is_behind(part, motion) for part in parts(root)):
         return
+    scene = bpy.context.scene
+    follows = same or (motion is not None and motion.so_far)
+    stays = follows and scene.frame_current == _peaks.get(root.mu_unit.uuid)
     for name, what in shown(root):
         try:
             show(root, name, what)
         except NotPrepared as wanted:
-            uuid = root.mu_unit.uuid
-            wanted.begin(lambda uuid=uuid: _follow(uuid))
+            wanted.begin(_later(root, follow))
         except MuError as error:
             hide(root, name, what)
             wrong = error.what
     root.mu_motion.trouble = wrong
+    if stays and motion is not None:
+        to_largest(root, motion, scene)
 
 
-def _follow(uuid: str) -> None:
-    root = unit_object.by_uuid(uuid)
-    if root is not None:
-        follow(root)
+def _is_behind(part: Any, motion: Motion | None) -> bool:
+    """Return True if a motion has states that a part of it does not play yet."""
+    return motion is not None and bool(part.get(REACHED, len(motion.time_s)) < motion.reached.sum())
+
+
+def _later(root: Any, act: Callable[[Any], None]) -> Callable[[], None]:
+    """A call of a function with a unit, if that is still there by then."""
+    uuid = root.mu_unit.uuid
+
+    def call() -> None:
+        found = unit_object.by_uuid(uuid)
+        if found is not None:
+            act(found)
+
+    return call
 
 
 def arrange(root: Any) -> None:
@@ -200,13 +221,12 @@ def _show_region(root: Any, motion: Motion, name: str, region: str) -> None:
     skin = motion.skin(region, cut)
     file = motion.folder / PLAYED / f"{name}-{region}{'-cut' if cut else ''}.pc2"
     old = displays.part(root, MOTION, f"{name}|{region}")
-    if old is not None and _plays(old, file):
+    if old is not None and _plays(old, file) and not _is_behind(old, motion):
         return
     rest = skin.of_nodes(motion.mesh.nodes)
     _write_cache(file, motion, rest, skin.of_nodes(*motion.sides(name)))
-    part = _part(root, motion, name, region)
+    part = _part(root, motion, name, region, file)
     skeletons.write(part.data, skeletons.Skeleton(rest, faces=(skin.triangles,)))
-    _play(part, motion, file)
 
 
 def _show_print(root: Any, motion: Motion, name: str) -> None:
@@ -228,7 +248,7 @@ def _show_print(root: Any, motion: Motion, name: str) -> None:
     moved = still if name == MODEL_A else motion.carried(name, carried)
     file = motion.folder / PLAYED / f"{name}-{PRINT}.pc2"
     _write_cache(file, motion, rest, moved)
-    part = _part(root, motion, name, PRINT)
+    part = _part(root, motion, name, PRINT, file)
     old = part.data
     part.data = solid.copy()
     part.data.name = old.name
@@ -239,7 +259,6 @@ def _show_print(root: Any, motion: Motion, name: str) -> None:
         f"{(outside > 0).mean():.0%} of it outside the mesh, by {outside.max():.2g} mm at most"
     )
     _prints[part.name_full, root.mu_unit.uuid] = Played(motion, _distances(moved, still))
-    _play(part, motion, file)
 
 
 _prints: dict[tuple[str, str], Played] = {}
@@ -253,7 +272,8 @@ def vertices_of(mesh: Any) -> Any:
     return found.reshape(-1, 3).astype(float)
 
 
-def _part(root: Any, motion: Motion, name: str, body: str) -> Any:
+def _part(root: Any, motion: Motion, name: str, body: str, file: Path) -> Any:
+    """The object that shows a motion, new or not; it plays the point cache of its vertices."""
     part = displays.part(root, MOTION, f"{name}|{body}")
     if part is None:
         title = f"{'Model A' if name == MODEL_A else name} {body}"
@@ -261,6 +281,8 @@ def _part(root: Any, motion: Motion, name: str, body: str) -> Any:
         displays.lock(part, location=False)
     run = studies.shown_run(root)
     part[RUN] = "" if run is None else run.key
+    part[REACHED] = int(motion.reached.sum())
+    play(part, file, float(motion.time_s[1] - motion.time_s[0]))
     return part
 
 
@@ -268,11 +290,6 @@ def _write_cache(file: Path, motion: Motion, rest: Any, displacement: Any) -> No
     """Write rest (v, 3) + displacement (s, v, 3) in mm at the protocol's samples. Raises OutputError."""
     step = float(motion.time_s[1] - motion.time_s[0])
     write_pc2(file, rest + displacement[motion.state], float(motion.time_s[0]), step)
-
-
-def _play(part: Any, motion: Motion, file: Path) -> None:
-    """Let an object play a point cache of its vertices."""
-    play(part, file, float(motion.time_s[1] - motion.time_s[0]))
 
 
 def _plays(part: Any, file: Path) -> bool:
@@ -374,8 +391,7 @@ def played(root: Any, part: Any, motion: Motion | None = None) -> Played | None:
     try:
         apart = run_motions.apart(root, motion, name, body, cut)
     except NotPrepared as wanted:
-        uuid = root.mu_unit.uuid
-        wanted.begin(lambda: _refresh(uuid))
+        wanted.begin(_later(root, refresh))
         return kept
     return kept if apart is None else attrs.evolve(kept, fields={**kept.fields, DIFFERENCE: apart})
 
@@ -407,12 +423,6 @@ def refresh(root: Any) -> None:
                 settings.low, settings.high = low, high
     colour(root)
     viewports.show_colours()
-
-
-def _refresh(uuid: str) -> None:
-    root = unit_object.by_uuid(uuid)
-    if root is not None:
-        refresh(root)
 
 
 def colour(root: Any) -> None:
@@ -450,6 +460,7 @@ def peak_frame(root: Any, scene: Any) -> int | None:
         if found is None or values is None or values.ndim == 1 or np.isnan(values).all():
             continue
         largest = np.nanpercentile(values, 100.0 - field_colours.RARE, axis=1)[found.motion.state]
+        largest[~found.motion.reached] = -np.inf
         sample = int(largest.argmax())
         if best is None or largest[sample] > best[0]:
             best = largest[sample], frame_of(found.motion, float(found.motion.time_s[sample]), scene)
@@ -464,11 +475,14 @@ def _write(root: Any, scene: Any) -> None:
         if found is None:
             continue
         _keep_time(part, float(found.motion.time_s[1] - found.motion.time_s[0]), scene)
-        first, second, share = found.motion.at(time_of(found.motion, scene))
+        time = time_of(found.motion, scene)
+        first, second, share = found.motion.at(time)
         for name, values in found.fields.items():
             now = values if values.ndim == 1 else (1 - share) * values[first] + share * values[second]
             if len(now) != len(part.data.vertices):
                 continue
+            if values.ndim > 1 and not found.motion.is_reached(time):
+                now = np.full_like(now, np.nan)
             attribute = part.data.attributes.get(name) or part.data.attributes.new(name, "FLOAT", "POINT")
             attribute.data.foreach_set("value", np.ascontiguousarray(now, np.float32))
             if name == root.mu_motion.field:
@@ -491,7 +505,7 @@ def _before_frame(scene, *_):
 
 @at_end
 def _forget() -> None:
-    for kept in (_played, _prints, run_motions):
+    for kept in (_peaks, _played, _prints, run_motions):
         kept.clear()
 
 
@@ -507,6 +521,13 @@ def _forget_trouble(root: Any) -> None:
     # What is empty is left: each write is an update of the scene.
     if root.mu_motion.trouble:
         root.mu_motion.trouble = ""
+
+
+@connected(JOB_NEWS)
+def _job_news(key: str) -> None:
+    for root in unit_object.roots():
+        if key == SIMULATION.key(root) and parts(root):
+            follow(root)
 
 
 @connected(JOB_ENDED)
@@ -553,3 +574,4 @@ def to_largest(root: Any, motion: Motion, scene: Any, jump: bool = True) -> None
     peak = peak_frame(root, scene) if jump else None
     if peak is not None:
         scene.frame_set(peak)
+        _peaks[root.mu_unit.uuid] = peak

@@ -53,7 +53,9 @@ class MU_PT_results(UnitPanel, bpy.types.Panel):
         if found.stale:
             alert(layout, "Stale: these results belong to other parameters. Simulate again")
         if not found.run.complete:
-            wrapped(layout, sentence(found.run.state), "INFO")
+            motion = motion_parts.motion_of(root)
+            words = [found.run.state, motion.so_far if motion is not None else ""]
+            wrapped(layout, sentence(": ".join(filter(None, words))), "INFO")
         if found.caveat:
             wrapped(layout, sentence(found.caveat), "INFO")
         column = layout.column(align=True)

@@ -36,10 +36,6 @@ def _surface(settings, context):
         settings.trouble = ""
 
 
-def _redraw(settings, context):
-    viewports.redraw()
-
-
 def _on_unit(settings, context):
     if updates.are_paused():
         # Hidden now, the candidates' tubes would stay.
@@ -47,10 +43,6 @@ def _on_unit(settings, context):
     if settings.on_unit:
         # They would lie beside it as soon as it bends.
         unit_object.hide_candidates(settings.id_data)
-    motion_parts.arrange(settings.id_data)
-
-
-def _apart(settings, context):
     motion_parts.arrange(settings.id_data)
 
 
@@ -104,7 +96,7 @@ class MU_PG_motion(bpy.types.PropertyGroup):
         name="Largest Value",
         description="Mark in the viewport where the field is largest at this frame",
         default=True,
-        update=_redraw,
+        update=lambda settings, context: viewports.redraw(),
     )
     apart: FloatProperty(
         name="Apart",
@@ -112,7 +104,7 @@ class MU_PG_motion(bpy.types.PropertyGroup):
         default=1.5,
         min=0.0,
         max=10.0,
-        update=_apart,
+        update=lambda settings, context: motion_parts.arrange(settings.id_data),
     )
     live: BoolProperty(
         name="Follow the Timeline",

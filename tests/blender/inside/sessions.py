@@ -1,6 +1,7 @@
 """Parts of `test_sessions`: what one session of Blender does before it ends, and what another one finds."""
 
 import sys
+import time
 from pathlib import Path
 
 import bpy
@@ -91,9 +92,7 @@ def leave_a_lasting_run():
     child = Child([sys.executable, LOCKED, str(folder)], own, environment([ROOT]))
     key = SIMULATION.key(root)
     jobs.lasting_jobs.keep(
-        jobs.lasting_jobs.Record(
-            key, "arm: simulation", folder, jobs.lasting_jobs.now_s(), (("Model A", 9.0),), True
-        )
+        jobs.lasting_jobs.Record(key, "arm: simulation", folder, time.time(), (("Model A", 9.0),), True)
     )
     jobs.watch(key, child, "arm: simulation", heavy=True, lasts=True)
     watch(lambda: child.progress)

@@ -26,8 +26,10 @@ from mu_addon.blender.unit.properties import to_unit
 from mu_addon.design.anchors import anchor_points
 from mu_addon.simulate_and_place.charts import ANGLE, angle_picture, delta_name, delta_picture
 
+from ...studies.bent_motion import write_bent_part, write_bent_run
 from .acting import add, refused
 from .drawing import drawn, panels_of
+from .jobs import launch, watch
 
 
 def started(study):
@@ -231,6 +233,63 @@ def test_every_way_into_a_result_shows_its_colours_or_says_that_this_view_cannot
             assert bpy.ops.mu.colours() == {"FINISHED"}
         assert (shading.type, shading.color_type) == ("SOLID", "VERTEX")
         assert not offered()
+
+
+def test_a_result_appears_state_by_state_while_its_job_runs(tmp_path):
+    root, scene = add(preset="mu-0.75x"), bpy.context.scene
+    root.mu_unit.study.folder = str(tmp_path / "home")
+    folder = write_bent_run(tmp_path / "home", 1000, ranked=False).folder
+
+    def solved(*pressures):
+        write_bent_part(folder, pressures)
+        angles = {f"{p:g}": 1.0 for p in (0.0, *pressures)}
+        (folder / "summary.json").write_text(json.dumps({"status": "running", "angle_deg": angles}))
+
+    def told():
+        child = launch(root, "good")
+        watch(lambda: child.state != "running")
+
+    def seen():
+        """Words of the legend, and whether every colour is that of what is not known."""
+        motion = motion_parts.motion_of(root)
+        mesh = motion_parts.one(root, "model_a", "mesh").data
+        colours = np.empty(4 * len(mesh.vertices), np.float32)
+        mesh.color_attributes[fields.COLOUR].data.foreach_get("color", colours)
+        unknown = np.isnan(values(mesh, root.mu_motion.field)).all()
+        assert unknown == (len(np.unique(colours.reshape(-1, 4), axis=0)) == 1)
+        _, *words = legend.lines(root, motion, scene)
+        return " | ".join(words[:2]), unknown
+
+    solved(10.0)
+    root.mu_unit.show = "result"
+    frames = {p: 1 + 24 * n for n, p in enumerate((-20, -10, 0, 10, 20, 30, 40))}
+    assert (scene.frame_current, scene.frame_end) == (frames[10], frames[40])
+    assert seen() == ("3.00 s, 10.0 kPa | 2 of 7 pressures so far", False)
+    assert "motion up to 10 kPa: 2 of 7 pressures so far" in drawn([results_panel.MU_PT_results])
+    for later in (frames[10] + 1, frames[20], frames[40], frames[-20]):
+        scene.frame_set(later)
+        words, unknown = seen()
+        assert "not solved yet" in words
+        assert unknown, "nothing that is not solved has a colour"
+
+    scene.frame_set(frames[10])
+    before = np.concatenate([moved(part) for part in motion_parts.parts(root)])
+    solved(10.0, 20.0, 30.0)
+    told()
+    assert scene.frame_current == frames[30], "it follows the largest one"
+    assert seen() == ("5.00 s, 30.0 kPa | 4 of 7 pressures so far", False)
+    further = np.concatenate([moved(part) for part in motion_parts.parts(root)])
+    assert further.max() > 2.5 * before.max()
+    scene.frame_set(frames[10])
+    again = np.concatenate([moved(part) for part in motion_parts.parts(root)])
+    np.testing.assert_allclose(again, before, atol=1e-5)
+
+    write_bent_run(tmp_path / "home", 2000, ranked=False)
+    told()
+    assert scene.frame_current == frames[10], "a view that was moved stays"
+    assert seen() == ("3.00 s, 10.0 kPa | coarse mesh (0.5)", False)
+    scene.frame_set(frames[-20])
+    assert seen() == ("0.00 s, -20.0 kPa | coarse mesh (0.5)", False)
 
 
 def test_a_field_of_few_spots_has_a_range_of_what_it_is_there():
