@@ -2,7 +2,7 @@
 
 A shape is a folder with the motion of its surfaces, the unit's file and bent.json, the answer that it came
 with (`requests`). Units that differ in size and stiffness alone bend alike: lengths go with the scale,
-pressures with the wall's modulus.
+pressures with the wall's modulus. With more or fewer chambers each bends about as before.
 """
 
 from __future__ import annotations
@@ -21,7 +21,7 @@ from ..design.quantity import describe
 from ..errors import InputError
 from ..files import write_json, write_npz
 from ..reading import file_bytes, parse_json
-from ..report.motion_files import FOLDER, MODEL_A, Motion, read_motion
+from ..report.motion_files import FOLDER, MODEL_A, Motion, Surface, read_motion
 
 UNIT, ANSWER = "unit.toml", "bent.json"
 KEPT = 20
@@ -72,16 +72,13 @@ def _short(lengths_mm: Any) -> Any:
 
 
 def nearest(unit: Unit, *shapes: Path) -> Known | None:
-    """The shape in folders of shapes that comes from the unit most like this one; None without any.
-
-    Units of other numbers of chambers are not alike.
-    """
+    """The shape in folders of shapes that comes from the unit most like this one; None without any."""
     files = [path for folder in shapes for path in folder.glob(f"*/{UNIT}")]
     try:
         found = [(_apart(unit, _unit_in(path, path.stat().st_mtime_ns)), path) for path in files]
-        apart, path = min(found, default=(math.inf, Path()))
-        if math.isinf(apart):
+        if not found:
             return None
+        apart, path = min(found)
         of, motion = read_unit(path), read_motion(path.parent)
         answer: dict[str, Any] = parse_json(file_bytes(path.with_name(ANSWER)), ANSWER)
     except (OSError, InputError):
@@ -90,6 +87,9 @@ def nearest(unit: Unit, *shapes: Path) -> Known | None:
         unit.scale / of.scale,
         unit.material.membrane_modulus_kPa / of.material.membrane_modulus_kPa,
     )
+    count, had = unit.chambers.count, of.chambers.count
+    if count != had:
+        motion = with_chambers(motion, of.printed.cell, had, count)
     motion = attrs.evolve(
         motion,
         mesh=attrs.evolve(motion.mesh, nodes=longer * motion.mesh.nodes),
@@ -101,8 +101,73 @@ def nearest(unit: Unit, *shapes: Path) -> Known | None:
             for region, fields in motion.fields.items()
         },
     )
-    states = [[stiffer * kPa, angle] for kPa, angle in answer["states"]]
+    states = [[stiffer * kPa, angle * (count / had)] for kPa, angle in answer["states"]]
     return Known(motion, answer | {"states": states}, apart < 1e-6)
+
+
+def with_chambers(motion: Motion, pitch_mm: float, had: int, count: int) -> Motion:
+    """The motion of a unit of other length: chambers in the middle of `had` are left out or repeated.
+
+    Each deforms as the one that it is taken from, on the section at which the one below it ends.
+    """
+    nodes = motion.mesh.nodes
+    moved = nodes + motion.model_a
+    lower = min(had, count) // 2
+    taken = [*range(lower), *[lower] * max(count - had, 0), *range(had - min(had, count) + lower, had)]
+    sections = [_section(nodes, moved, pitch_mm * k) for k in range(had + 1)]
+    steps, below = [], np.eye(3)
+    for number, source in enumerate(taken):
+        # In the bending plane, y and z: rigid motions as homogeneous matrices.
+        up = np.eye(3)
+        up[1, 2] = pitch_mm * (number - source)
+        placed = below @ up @ np.linalg.inv(sections[source])
+        below = placed @ sections[source + 1] @ np.linalg.inv(up)
+        steps.append((source, up[1, 2], placed))
+    rest: list[Any] = []
+    turned, surfaces, fields = [], {}, {}
+    for region, surface in motion.surfaces.items():
+        chamber = np.clip(nodes[surface.node[surface.triangles], 2].mean(axis=1) // pitch_mm, 0, had - 1)
+        kept: list[Any] = []
+        faces, cut = [], []
+        for source, higher, placed in steps:
+            own = chamber == source
+            vertices, triangles = np.unique(surface.triangles[own], return_inverse=True)
+            faces.append(sum(map(len, kept)) + triangles.reshape(-1, 3))
+            cut.append(surface.cut[own])
+            kept.append(vertices)
+            at = surface.node[vertices]
+            rest.append(nodes[at] + [0.0, 0.0, higher])
+            flat = moved[:, at, 1:] @ placed[:, :2, :2].swapaxes(1, 2) + placed[:, None, :2, 2]
+            turned.append(np.dstack([moved[:, at, :1], flat]))
+        every = np.concatenate(kept)
+        node = sum(map(len, rest)) - len(every) + np.arange(len(every))
+        surfaces[region] = Surface(node, np.concatenate(faces), np.concatenate(cut))
+        fields[region] = {name: values[:, every] for name, values in motion.fields[region].items()}
+    made = np.concatenate(rest)
+    return attrs.evolve(
+        motion,
+        mesh=attrs.evolve(motion.mesh, nodes=made),
+        model_a=(np.concatenate(turned, axis=1) - made).astype(np.float32),
+        surfaces=surfaces,
+        fields=fields,
+    )
+
+
+def _section(nodes: Any, moved: Any, height_mm: float) -> Any:
+    """How the section at a height moved in the plane of y and z: rigid motions (s, 3, 3), homogeneous."""
+    apart = np.abs(nodes[:, 2] - height_mm)
+    near = apart < apart.min() + 0.1
+    before, after = nodes[near, 1:], moved[:, near, 1:]
+    middle, middles = before.mean(axis=0), after.mean(axis=1)
+    a, b = before - middle, after - middles[:, None]
+    turn = np.arctan2((a[:, 0] * b[..., 1] - a[:, 1] * b[..., 0]).sum(axis=1), (a * b).sum(axis=(1, 2)))
+    found = np.zeros((len(moved), 3, 3))
+    found[:, 0, 0] = found[:, 1, 1] = np.cos(turn)
+    found[:, 1, 0] = np.sin(turn)
+    found[:, 0, 1] = -found[:, 1, 0]
+    found[:, :2, 2] = middles - found[:, :2, :2] @ middle
+    found[:, 2, 2] = 1.0
+    return found
 
 
 @lru_cache(maxsize=64)
@@ -111,12 +176,10 @@ def _unit_in(path: Path, changed_ns: int) -> Unit:
 
 
 def _apart(one: Unit, other: Unit) -> float:
-    """0 for units that bend alike; else the sum of the parameters' differences, infinite for other chambers.
+    """0 for units that bend alike; else the sum of the parameters' differences.
 
     A number counts by the logarithm of its ratio, anything else as 1.
     """
-    if other.chambers.count != one.chambers.count:
-        return math.inf
     apart = 0.0
     for section in SECTIONS:
         for d in describe(section) if section is not Waveguide else ():

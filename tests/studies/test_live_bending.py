@@ -5,8 +5,10 @@ import shutil
 from pathlib import Path
 from tempfile import TemporaryDirectory
 
+import attrs
 import numpy as np
 import pytest
+from scipy.spatial import KDTree
 
 from mu_addon.body.printed_mesh import mesh_printed
 from mu_addon.design.assets import asset_root
@@ -14,10 +16,13 @@ from mu_addon.design.parameters import Unit, load_preset, preset_names
 from mu_addon.design.rigid_body import RigidBody
 from mu_addon.errors import InputError
 from mu_addon.fem.protocol import Protocol
+from mu_addon.fem.state import rest
+from mu_addon.fem.trajectory import Trajectory
+from mu_addon.fem.unit_materials import materials_of
 from mu_addon.live_bending import known, requests, run
 from mu_addon.live_bending.run import LiveBending
 from mu_addon.meshing.settings import MeshSettings
-from mu_addon.report.motion_files import read_motion
+from mu_addon.report.motion_files import read_motion, write_model_a
 from mu_addon.studies.unit_ranking import UnitStudy
 from tests.design.kinds import cross, custom
 
@@ -76,7 +81,40 @@ def test_a_wall_from_the_design_before_bends_as_one_meshed_anew(tmp_path):
             )
             assert next(of) == pytest.approx(scale * next(of), abs=5e-3)
     assert not known.nearest(thicker, shapes).same
-    assert known.nearest(UNIT.evolve(count=4), shapes) is None
+    assert not known.nearest(UNIT.evolve(count=4), shapes).same
+
+
+@pytest.mark.parametrize("count", [3, 5, 8])
+def test_chambers_that_a_kept_shape_lacks_or_has_too_many_bend_as_its_own(tmp_path, count):
+    """Of a unit whose axis becomes a circle: with more chambers it is more of the same circle."""
+    unit, radius = load_preset("mu-1.0x").evolve(count=5), 60.0
+
+    def bent(nodes):
+        angle = nodes[..., 2] / radius
+        y = (radius + nodes[..., 1]) * np.cos(angle) - radius
+        return np.stack([nodes[..., 0], y, (radius + nodes[..., 1]) * np.sin(angle)], axis=-1)
+
+    def shaped(unit):
+        mesh = mesh_printed(unit, MeshSettings(refine=0.2))
+        states = (rest(mesh), attrs.evolve(rest(mesh), pressure_MPa=0.04, u=bent(mesh.nodes) - mesh.nodes))
+        motion = Trajectory(np.arange(2.0), np.array([0.0, 40.0]), states, np.arange(2), mesh)
+        write_model_a(tmp_path / "motion", mesh, materials_of(unit, mesh), motion)
+        return read_motion(tmp_path / "motion")
+
+    known.keep(shaped(unit), {"states": [[0.0, 0.0], [40.0, 60.0]]}, unit, tmp_path / "shapes")
+    wanted, found = unit.evolve(count=count), known.nearest(unit.evolve(count=count), tmp_path / "shapes")
+    assert found.same == (count == 5)
+    assert found.answer["states"][1] == [40.0, pytest.approx(60.0 * count / 5)]
+    truth = shaped(wanted)
+    for region, surface in truth.surfaces.items():
+        own, nodes = found.motion.surfaces[region], found.motion.mesh.nodes
+        assert len(own.triangles) == len(surface.triangles) == len(own.cut)
+        assert found.motion.fields[region]["von_mises_kPa"].shape == (2, len(own.node))
+        places = nodes[own.node]
+        distance, _ = KDTree(places).query(truth.mesh.nodes[surface.node])
+        assert distance.max() < 0.01, "the same surface at rest"
+        moved = places + found.motion.model_a[1, own.node]
+        assert np.abs(moved - bent(places)).max() < 0.2, "on the same circle"
 
 
 @pytest.mark.nightly("test_a_wall_from_the_design_before_bends_as_one_meshed_anew")

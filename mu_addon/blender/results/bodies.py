@@ -37,9 +37,10 @@ def put(
         if part is None:
             part = displays.add(root, mark, region, bpy.data.meshes.new(f"{title} {region}"))
             displays.lock(part)
-        if part.data.get("mu_triangles") != len(triangles[region]):
+        size = [len(vertices[region]), len(triangles[region])]
+        if list(part.data.get("mu_size", ())) != size:
             skeletons.write(part.data, skeletons.Skeleton(vertices[region], faces=(triangles[region],)))
-            part.data["mu_triangles"] = len(triangles[region])
+            part.data["mu_size"] = size
         found.append(part)
     return found
 
