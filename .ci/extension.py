@@ -26,14 +26,15 @@ import subprocess
 import sys
 import tempfile
 import tomllib
+from concurrent.futures import ThreadPoolExecutor
 from itertools import product
 from pathlib import Path
 
 import gmsh_window
 import warp_cpu
 from bill import write_bill
-from slim import slim
-from wheels import BLENDERS, PLATFORMS, PYTHONS, download, not_as_pinned, pinned, replaced
+from slim import Slimmed, slim
+from wheels import BLENDERS, PLATFORMS, PYTHONS, Wheel, download, not_as_pinned, pinned, replaced
 
 ROOT = Path(__file__).resolve().parents[1]
 
@@ -129,14 +130,18 @@ def build(tool: Path, out: Path, platform: str | None = None, python: str = "", 
         stage(source)
         target = ["--output-dir", str(out)]
         if platform is not None:
-            wheels = []
             wanted = [w for w in pinned() if (w.platform, w.python) == (platform, python)]
-            for pin, pinned_wheel in zip(wanted, download(out / "wheels", platform, python), strict=True):
-                new = {name: made_anew(name, pinned_wheel, out / "wheels") for name in replaced(pin, cuda)}
-                wheel, change = slim(pinned_wheel, out / "wheels" / platform / python / "slim", new)
-                wheels.append(wheel)
-                slimmed += [change] if change else []
-            bundle(source, wheels, platform, python)
+
+            def made(pin: Wheel, wheel: Path) -> tuple[Path, Slimmed | None]:
+                new = {name: made_anew(name, wheel, out / "wheels") for name in replaced(pin, cuda)}
+                return slim(wheel, out / "wheels" / platform / python / "slim", new)
+
+            # LZMA takes a core a wheel, and leaves Python's lock to others. Warp's, the last, takes longest.
+            wheels = download(out / "wheels", platform, python)
+            with ThreadPoolExecutor() as pool:
+                found = [*pool.map(made, wanted[::-1], wheels[::-1])]
+            slimmed = [change for _, change in found if change]
+            bundle(source, [wheel for wheel, _ in found], platform, python)
             version = tomllib.loads((source / "blender_manifest.toml").read_text(encoding="utf-8"))["version"]
             archive = (
                 out
