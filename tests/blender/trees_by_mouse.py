@@ -120,7 +120,17 @@ def worked_on_by_nodes():
     yield 2.0
     states = {name: found.state for name, found in trees.refresh(outer).items()}
     assert set(states.values()) <= {"cached", "computed"}, states
-    editor()[0].ui_type = "VIEW_3D"
+    area, region = editor()
+    window = bpy.context.window_manager.windows[0]
+    with bpy.context.temp_override(window=window, area=area, region=region):
+        bpy.ops.view2d.pan(deltax=5000)
+        bpy.ops.mu.tree_new(template="unit")
+    yield 4.0
+    for one in area.spaces.active.node_tree.nodes:
+        x, y = at(one, 0.5, 1.0)
+        assert region.x < x < region.x + region.width, "a new tree is framed"
+        assert region.y < y < region.y + region.height, "a new tree is framed"
+    area.ui_type = "VIEW_3D"
     yield 2.0
 
 

@@ -15,6 +15,7 @@ from ..jobs import start_child
 from ..jobs.operators import job_operators
 from ..shared.blender_property import Choice, Flag, Text, listed
 from ..shared.operators import FreeOperator, choose_file, open_file, operator
+from ..shared.registration import timer
 from ..shared.wording import sentence
 from ..unit.base_classes import UnitOperator
 from . import conversion, following, state
@@ -46,6 +47,18 @@ def show(context, tree) -> None:
     if getattr(space, "type", "") == "NODE_EDITOR":
         space.tree_type = TREE
         space.node_tree = tree
+        _frame.soon(0.2)
+
+
+@timer()
+def _frame() -> None:
+    """Frame the trees in node editors, once nodes were drawn and so have a size."""
+    for window in bpy.context.window_manager.windows:
+        for area in window.screen.areas:
+            if area.ui_type == TREE:
+                region = next(region for region in area.regions if region.type == "WINDOW")
+                with bpy.context.temp_override(window=window, area=area, region=region):
+                    bpy.ops.node.view_all()
 
 
 def _open(context, tree) -> None:
