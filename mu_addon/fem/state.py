@@ -50,8 +50,8 @@ def lagrange(places: Sequence[float], values: Sequence[Array], at: float) -> Arr
     [9.0]
     """
     found = np.zeros_like(values[0])
-    for a, value in zip(places, values, strict=True):
-        found += np.prod([(at - b) / (a - b) for b in places if b != a]) * value
+    for n, (a, value) in enumerate(zip(places, values, strict=True)):
+        found += np.prod([(at - b) / (a - b) for b in [*places[:n], *places[n + 1 :]]]) * value
     return found
 
 
