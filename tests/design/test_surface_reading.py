@@ -51,16 +51,17 @@ def ply(form="ascii", faces="vertex_indices"):
 
 
 def rich_ply(form):
-    """Other elements first and between, normals before places, doubles, scalars before a list."""
+    """Other elements first and between, normals before places, doubles; a face has another list."""
     head = (
-        f"ply\nformat {form} 1.0\nobj_info by hand\nelement material 2\nproperty uchar red\n"
+        f"ply\nformat {form} 1.0\nobj_info by hand\ncomment TextureFile none.jpg\nelement material 2\n"
+        "property uchar red\n"
         f"property list uchar ushort names\nelement vertex {2 * N}\nproperty float nx\nproperty float64 x\n"
         f"property double y\nproperty float64 z\nproperty uint8 red\nelement edge 1\nproperty int vertex1\n"
         f"element face {len(FACES)}\nproperty uchar material\nproperty list int8 uint32 vertex_indices\n"
-        "property short flags\nend_header\n"
+        "property list uchar float texcoord\nproperty short flags\nend_header\n"
     )
     rows = [("BB2H", 1, 2, 5, 6), ("BB", 1, 0), *(("fdddB", 0.5, *p, 255) for p in POINTS), ("i", 3)]
-    rows += [(f"Bb{len(f)}Ih", 1, len(f), *f, -1) for f in FACES]
+    rows += [(f"Bb{len(f)}IB2fh", 1, len(f), *f, 2, 0.5, 0.25, -1) for f in FACES]
     if form == "ascii":
         return (head + "\n".join(" ".join(map(str, row[1:])) for row in rows)).encode()
     order = "<" if "little" in form else ">"

@@ -2,7 +2,6 @@
 
 import zipfile
 
-import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
@@ -91,15 +90,6 @@ def workbook(path, sheets):
         for row in rows:
             sheet.append(row)
     book.save(path)
-
-
-def test_a_workbook_has_a_sheet_for_each_specimen(tmp_path):
-    rows = [["Time", "Force"], ["s", "N"], *[[0.1 * i, 2.5 * i] for i in range(5)]]
-    workbook(tmp_path / "a.xlsx", {"Specimen 1": rows, "empty": [], "Specimen 2": rows})
-    sheets = read_sheets(tmp_path / "a.xlsx")
-    assert [sheet.name for sheet in sheets] == ["Specimen 1", "Specimen 2"]
-    read = [[number(c, ".") for c in row.cells] for row in sheets[0].rows[2:]]
-    assert np.array(read) == pytest.approx(np.array(rows[2:], float))
 
 
 def test_a_workbook_that_unpacks_to_gigabytes_is_refused(tmp_path):

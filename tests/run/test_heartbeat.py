@@ -10,6 +10,8 @@ import pytest
 from mu_addon.run.heartbeat import PATIENCE_S, Heartbeat, to_watcher
 from mu_addon.run.progress import Progress
 
+from .clock import Clock
+
 # Holds the interpreter for five seconds, so that no thread of it runs, and begins with a silence as long;
 # its watcher is less patient.
 HELD = """
@@ -33,13 +35,6 @@ studies._run = run
 words = sys.argv[1:]
 sys.exit(run_watched(words, lambda: main.main(words)))
 """
-
-
-class Clock:
-    now = 0.0
-
-    def __call__(self):
-        return self.now
 
 
 @pytest.fixture

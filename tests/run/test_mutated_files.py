@@ -11,7 +11,6 @@ import os
 import random
 import re
 import shutil
-import struct
 import zipfile
 from collections.abc import Callable, Iterator
 from pathlib import Path
@@ -41,15 +40,14 @@ from mu_addon.studies.inputs import ResinInput
 from mu_addon.studies.starting import kind_of
 from mu_addon.studies.unit_ranking import UnitStudy
 
+from ..design.test_surface_reading import CORNERS, obj, ply, stl
 from .test_reading import READERS
 
 COUNT = int(os.environ.get("MUTANTS", "15"))
 SEED = os.environ.get("MUTANTS_SEED", "")
 DATA = Path(__file__).parents[1] / "data"
 FUZZED = DATA / "fuzz.zip"
-VERTICES = np.array([[x, y, z] for x in (0.0, 20.0) for y in (0.0, 20.0) for z in (0.0, 75.0)])
-FACES = [(0, 1, 3), (0, 3, 2), (4, 6, 7), (4, 7, 5), (0, 4, 5), (0, 5, 1), (2, 3, 7), (2, 7, 6), (0, 2, 6)]
-FACES += [(0, 6, 4), (1, 5, 7), (1, 7, 3)]
+STL = stl_bytes(CORNERS.reshape(-1, 3), np.arange(CORNERS.size // 3).reshape(-1, 3))
 # Pieces that no sound file has, put in the place of a number or a word, or anywhere.
 NASTY = [
     b"nan", b"-inf", b"1e999", b"-1", b"0", b"1e-320", b"9" * 400, b"0x" + b"f" * 400, b"true", b'""', b"[]",
@@ -108,37 +106,6 @@ def mutants(name: str, contents: list[bytes]) -> Iterator[bytes]:
         yield mutated(random_, random_.choice(contents))
 
 
-def ascii_stl() -> bytes:
-    corners = "".join(
-        "facet normal 0 0 0\nouter loop\n"
-        + "".join(f"vertex {' '.join(map(str, VERTICES[v]))}\n" for v in face)
-        + "endloop\nendfacet\n"
-        for face in FACES
-    )
-    return f"solid box\n{corners}endsolid box\n".encode()
-
-
-def obj() -> bytes:
-    points = "".join(f"v {x} {y} {z}\n" for x, y, z in VERTICES)
-    return (points + "".join(f"f {a + 1} {b + 1} {c + 1}\n" for a, b, c in FACES)).encode()
-
-
-def ply(binary: bool) -> bytes:
-    kind = "binary_little_endian" if binary else "ascii"
-    head = (
-        f"ply\nformat {kind} 1.0\nelement vertex 8\nproperty float x\nproperty float y\nproperty float z\n"
-        "element face 12\nproperty list uchar int vertex_indices\nend_header\n"
-    ).encode()
-    if binary:
-        return head + VERTICES.astype("<f4").tobytes() + b"".join(struct.pack("<B3i", 3, *f) for f in FACES)
-    return (
-        head
-        + "".join(
-            [f"{x} {y} {z}\n" for x, y, z in VERTICES] + [f"3 {a} {b} {c}\n" for a, b, c in FACES]
-        ).encode()
-    )
-
-
 def npz(folder: Path) -> bytes:
     write_npz(
         folder / "a.npz", {"u": np.arange(300.0).reshape(-1, 3), "name": np.array(["alpha1", "alpha2"])}
@@ -186,16 +153,12 @@ CORPUS: dict[str, tuple[str, Callable[[Path], bytes], Callable[[Path], Any]]] = 
 CORPUS |= {
     "phases": ("phases.csv", lambda _: shipped_phases().text().encode(), read_phases),
     "pixels": ("pixels.csv", lambda _: PIXELS, read_pixels),
-    "STL": ("body.stl", lambda _: stl_bytes(VERTICES, np.array(FACES)), read_body),
-    "STL in text": ("body.stl", lambda _: ascii_stl(), read_body),
-    "STL to check": (
-        "part.stl",
-        lambda _: stl_bytes(VERTICES, np.array(FACES)),
-        lambda path: stl_surface(path.read_bytes()),
-    ),
-    "OBJ": ("body.obj", lambda _: obj(), read_body),
-    "PLY": ("body.ply", lambda _: ply(binary=False), read_body),
-    "PLY of bytes": ("body.ply", lambda _: ply(binary=True), read_body),
+    "STL": ("body.stl", lambda _: STL, read_body),
+    "STL in text": ("body.stl", lambda _: stl(CORNERS).encode(), read_body),
+    "STL to check": ("part.stl", lambda _: STL, lambda path: stl_surface(path.read_bytes())),
+    "OBJ": ("body.obj", lambda _: obj().encode(), read_body),
+    "PLY": ("body.ply", lambda _: ply(), read_body),
+    "PLY of bytes": ("body.ply", lambda _: ply("binary_little_endian"), read_body),
     "NPZ": ("b.npz", npz, read_npz),
     "node tree": ("tree.toml", lambda _: TREE, read_tree),
     "recording": ("recording-000.csv", lambda _: RECORDING, recording_with("recording-000.csv")),

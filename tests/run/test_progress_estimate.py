@@ -6,15 +6,9 @@ from hypothesis import strategies as st
 
 from mu_addon.run.progress_estimate import SHOWN_S, Pace, ProgressEstimate
 
+from .clock import Clock
+
 PLAN = (("mesh", 10.0), ("Model A", 60.0), ("report", 10.0))
-
-
-class Clock:
-    def __init__(self):
-        self.now = 0.0
-
-    def __call__(self):
-        return self.now
 
 
 def estimate(plan=PLAN):

@@ -4,13 +4,11 @@ from __future__ import annotations
 
 import json
 import os
-import random
 import re
 import subprocess
 import sys
 import tracemalloc
 from collections.abc import Callable
-from contextlib import suppress
 from pathlib import Path
 from typing import Any
 
@@ -129,10 +127,9 @@ BAD = {
 def test_a_bad_file_is_refused(name: str, what: str, tmp_path: Path) -> None:
     path = tmp_path / "file.toml"
     path.write_bytes(BAD[what])
-    if name == "recording" or (name == "values" and what in ("empty",)):
-        # Lines of an index that are none are passed over; a set of values may hold none.
-        found = READERS[name][0](path)
-        assert not found if name == "recording" else found == {"values": {}, "held_cells": 0.0}
+    if name == "recording":
+        # Lines of an index that are none are passed over.
+        assert not READERS[name][0](path)
         return
     with pytest.raises(InputError) as told:
         READERS[name][0](path)
@@ -160,7 +157,7 @@ def test_a_file_of_gigabytes_is_refused_by_its_size(name: str, tmp_path: Path) -
     try:
         with pytest.raises(InputError) as told:
             READERS[name][0](path)
-        assert name == "values" or "its 3221 MB are more" in told.value.what
+        assert "its 3221 MB are more" in told.value.what
         assert tracemalloc.get_traced_memory()[1] < 3e6
     finally:
         tracemalloc.stop()
@@ -207,44 +204,6 @@ def test_a_document_that_would_fill_the_memory_is_refused() -> None:
     for parse in (parse_toml, parse_json):
         with pytest.raises(InputError, match="its 18 MB are more than"):
             parse("a=" + text if parse is parse_toml else text, "x")
-
-
-@pytest.mark.parametrize("name", [name for name, (_, text) in READERS.items() if text])
-def test_damaged_files_end_in_a_clear_error(name: str, tmp_path: Path) -> None:
-    """Every number made true, a text, nested or huge; bytes changed at random."""
-    reader, text = READERS[name]
-    assert text
-    path = tmp_path / "file.toml"
-    path.write_text(text)
-    reader(path)
-    random_ = random.Random(name)
-    lines = text.splitlines()
-    for _ in range(150):
-        changed = list(lines)
-        place = random_.randrange(len(changed))
-        key, equals, _ = changed[place].partition("=")
-        if equals and random_.random() < 0.7:
-            worst = (
-                "true",
-                '"x"',
-                "[]",
-                "{}",
-                "nan",
-                "-inf",
-                "9" * 400,
-                "1e400",
-                "[[[]]]",
-                '"\\u001b[2J"',
-                "-1",
-                "1e300",
-            )
-            changed[place] = f"{key}= {random_.choice(worst)}"
-        data = bytearray("\n".join(changed).encode())
-        if random_.random() < 0.5:
-            data[random_.randrange(len(data))] = random_.randrange(256)
-        path.write_bytes(data)
-        with suppress(InputError):
-            reader(path)
 
 
 def test_toml_and_json() -> None:

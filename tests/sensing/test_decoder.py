@@ -184,13 +184,6 @@ def test_garbage_between_lines_is_counted_and_passed() -> None:
     assert len(all_of(groups, "values")) == 199
 
 
-def test_a_damaged_label_is_no_new_channel() -> None:
-    lines = [f"light:{k},dark:1\n" for k in range(50)]
-    lines[20] = "lght:20,dark:1\n"
-    groups = fed(Decoder(), "".join(lines).encode())
-    assert {g.layout.channels for g in groups} == {("light", "dark")}
-
-
 def test_a_device_that_changes_its_language() -> None:
     decoder = Decoder()
     text = "".join(f"light:{k},dark:1\n" for k in range(100)).encode()
@@ -218,17 +211,6 @@ def test_no_bytes_crash_it(chunks: list[bytes]) -> None:
         decoder.feed(chunk, 0.01 * k)
     decoder.interrupted()
     decoder.finish(1.0)
-
-
-@given(
-    st.lists(st.sampled_from(["light:1\n", "dark:2,", "{", '{"a":1}\n', "1,2\n", "seq,a\n", "\x00", "nan\n"]))
-)
-@settings(max_examples=100)
-def test_no_lines_crash_it(parts: list[str]) -> None:
-    decoder = Decoder()
-    for k, part in enumerate(parts * 5):
-        decoder.feed(part.encode(), 0.01 * k)
-    decoder.finish(10.0)
 
 
 def test_host_time_follows_the_least_delayed() -> None:

@@ -164,10 +164,9 @@ def test_the_port_is_given_back_and_taken_again(tmp_path: Path) -> None:
     assert [m["text"] for m in recording.messages if m.get("event") == "mark"] == ["looked elsewhere"]
 
 
-@pytest.mark.parametrize("command", ["stream", "record"])
-def test_killed_while_recording(tmp_path: Path, command: str) -> None:
+def test_killed_while_recording(tmp_path: Path) -> None:
     link, folder = tmp_path / "port", tmp_path / "out"
-    run = [sys.executable, str(ROOT / "headless/run.py"), command, "--port", str(link), "--out", str(folder)]
+    run = [sys.executable, str(ROOT / "headless/run.py"), "record", "--port", str(link), "--out", str(folder)]
     with sending(link, 2000, 3600), subprocess.Popen(run, stdout=subprocess.DEVNULL) as process:
         wait_for((folder / "recording-000.csv").exists)
         time.sleep(1.0)
@@ -192,23 +191,6 @@ def test_ctrl_c_is_a_good_end(tmp_path: Path) -> None:
     assert process.returncode == 0
     assert "nothing lost" in out
     assert json.loads((folder / "summary.json").read_text())["status"] == "complete"
-
-
-def test_asked_on_standard_input(tmp_path: Path) -> None:
-    folder = tmp_path / "out"
-    run = [sys.executable, str(ROOT / "headless/run.py"), "record", "--simulate", "--controlled"]
-    with subprocess.Popen([*run, "--out", str(folder)], stdin=subprocess.PIPE, text=True) as process:
-        wait_for((folder / "recording-000.csv").exists)
-        assert process.stdin is not None
-        process.stdin.write("mark halfway\npause\n")
-        process.stdin.flush()
-        wait_for(lambda: json.loads((folder / "status.json").read_text())["state"] == "paused")
-        # The end of its input, as when Blender was killed.
-        process.stdin.close()
-        assert process.wait(timeout=1800) == 0
-    events = [m.get("event") for m in read_recording(folder)[0].messages]
-    assert "mark" in events
-    assert "paused" in events
 
 
 def test_a_recording_plays_again_to_the_digit(tmp_path: Path) -> None:

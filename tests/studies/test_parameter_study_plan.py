@@ -169,8 +169,6 @@ def test_the_inputs_are_written_as_toml_that_says_the_same(tmp_path):
 @pytest.mark.parametrize(
     ("old", "new", "words"),
     [
-        ("format = 1", "format = 2", "format = 2"),
-        ("format = 1", "", "does not say its format"),
         ('preset = "mu-1.0x"', "", "no unit is given"),
         ('preset = "mu-1.0x"', 'preset = "mu-9x"', "mu-9x"),
         ("points = 8", "points = 1", "points = 1"),
@@ -179,8 +177,6 @@ def test_the_inputs_are_written_as_toml_that_says_the_same(tmp_path):
         ("points = 8", 'method = "random"', "is not known"),
         ("points = 8", "memory_MB = 1", "memory_MB"),
         ("points = 8", "minimize = 3", "give a list"),
-        ("times = 7", "times = 1", "times = 1 is out of bounds"),
-        ("times = 7", "tmies = 7", "unknown key 'tmies'"),
         ("times = 7", 'times = 7\nobstacles = "post.obj"', "does not take obstacles"),
         ("refine = 0.4", "refine = 99.0", "refine"),
         ("mesh = {", "mesh = 3 #", "not a table"),
@@ -188,13 +184,11 @@ def test_the_inputs_are_written_as_toml_that_says_the_same(tmp_path):
         ("low = 0.8, high = 1.2", "low = 0.8", "high is missing"),
         ("low = 0.8, high = 1.2", "low = 0.8, high = 1.2, log = 3", "log = 3"),
         ("low = 0.8, high = 1.2", "low = 0.8, high = 1.2, steps = 1", "steps = 1"),
-        ("low = 0.8, high = 1.2", "low = 0.8, high = 1.2, hook = 1", "unknown key 'hook'"),
         ("low = 0.8, high = 1.2", "low = nan, high = 1.2", "low = nan is not a finite number"),
         ("low = 0.8, high = 1.2", "values = []", "values is empty"),
         ("chambers.wall_mm", "chambers.wal_mm", "did you mean 'chambers.wall_mm'"),
         ("chambers.wall_mm", "__class__.x", "unknown input"),
         ('stages = "place"', 'stages = "simulate"', "is not one of its stages"),
-        ("[vary]", "[vary]\na = " + "[" * 50_000, "not TOML"),
     ],
 )  # fmt: skip
 def test_what_is_wrong_is_told_before_any_work(tmp_path, old, new, words):

@@ -195,10 +195,6 @@ def test_pixels_are_written_as_they_are_read(tmp_path):
     (tmp_path / "bad.csv").write_text("frame,a right_px\n0,1\n1,2\n")
     with pytest.raises(InputError, match="column 'a down_px' is missing"):
         read_pixels(tmp_path / "bad.csv")
-    (tmp_path / "bad.csv").write_text("a right_px,a down_px\n0,1\n1,two\n")
-    with pytest.raises(InputError, match="not a number") as caught:
-        read_pixels(tmp_path / "bad.csv")
-    assert caught.value.where.endswith("bad.csv, row 3")
 
 
 def test_the_command_line_from_followed_pixels(tmp_path, capsys):
@@ -215,8 +211,6 @@ def test_the_command_line_from_followed_pixels(tmp_path, capsys):
     assert summary["mm_per_pixel"] == pytest.approx(0.25)
     (e,) = read_folder(tmp_path / "out").experiments
     assert np.nanmax(np.abs(e["angle_deg"] - bend(e["time_s"]))) < 1e-5
-    assert main(["track", str(tmp_path / "none.mp4"), *line[2:]]) == 2
-    assert "the clip does not exist" in capsys.readouterr().err
 
 
 def test_without_blender_a_movie_is_refused_with_what_to_do(tmp_path, capsys, monkeypatch):
