@@ -11,14 +11,12 @@ import pytest
 from mu_addon.design.parameters import load_preset
 from mu_addon.evidence import unit_fem
 from mu_addon.measured import read_folder
-from mu_addon.run.context import run_to_end
-from mu_addon.run.progress import Progress
 from mu_addon.studies.diagnose import Diagnose
-from mu_addon.studies.starting import start
 
 from .evidence import analytic
 from .made_once import made_once
 from .studies.diagnosis_data import bent_unit
+from .studies.unit_runs import ended
 
 
 def responses(unit, experiments, settings, cache, progress, held):
@@ -33,16 +31,12 @@ def responses(unit, experiments, settings, cache, progress, held):
 def judge(folder, gauge_kPa=0.0):
     """Fill data/ and study/evidence/ of a folder, and said.json with the messages of the run."""
     data = bent_unit(folder / "data", {"clogged_chamber.share_lost": 0.5}, gauge_kPa=gauge_kPa)
-    messages = []
+    job = Diagnose(
+        data=read_folder(data), unit=load_preset("mu-1.0x"), settings=unit_fem.UnitSettings(whole=None)
+    )
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(unit_fem, "unit_responses", responses)
-        with run_to_end(Progress([messages.append])) as context:
-            job = Diagnose(
-                data=read_folder(data),
-                unit=load_preset("mu-1.0x"),
-                settings=unit_fem.UnitSettings(whole=None),
-            )
-            start(job, folder / "study" / "evidence", context)
+        context, messages = ended(job, folder / "study" / "evidence")
     assert context.status == 0, messages[-1]
     (folder / "said.json").write_text(json.dumps(messages, default=str))
     return folder

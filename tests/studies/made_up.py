@@ -2,7 +2,6 @@
 
 import functools
 
-import attrs
 import numpy as np
 import pytest
 
@@ -12,8 +11,8 @@ from mu_addon.fem.kinematics import probe
 from mu_addon.fem.state import State
 from mu_addon.fem.trajectory import Trajectory
 from mu_addon.meshing.settings import MeshSettings
-from mu_addon.run.context import run_to_end
-from mu_addon.run.progress import Progress
+
+from .unit_runs import ran
 
 UNIT = load_preset("mu-1.0x").evolve(count=4)
 MESH = MeshSettings(refine=0.35)
@@ -78,7 +77,6 @@ def place(folder, job):
     """Run a study in a folder, in this process; its motion, map and lattice's paths are made up."""
     from mu_addon.placement.sensitivity_map import Influence, loaded
     from mu_addon.simulate_and_place import graph_search
-    from mu_addon.studies.starting import start
 
     def influence(model, materials, trajectory, monitor, pressures, sides):
         height = model.mesh.nodes[model.mesh.corners].mean(axis=1)[:, 2]
@@ -104,8 +102,4 @@ def place(folder, job):
     with pytest.MonkeyPatch.context() as patch:
         for name, value in made_up.items():
             patch.setattr(f"mu_addon.simulate_and_place.{name}", value)
-        messages = []
-        with run_to_end(Progress([messages.append])) as context:
-            context.wants_report = False
-            start(attrs.evolve(job, workers=1), folder, context)
-        assert context.status == 0, messages[-1]
+        ran(job, folder)

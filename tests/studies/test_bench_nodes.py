@@ -13,38 +13,16 @@ from mu_addon.errors import InputError
 from mu_addon.graph import Evaluation, Node, NodeTree, Source
 from mu_addon.nodes.definitions import definitions
 from mu_addon.nodes.runs import FolderRuns
-from mu_addon.run.context import run_to_end
-from mu_addon.run.progress import Progress
-from mu_addon.sensing.recording import Recorder
-from mu_addon.sensing.samples import Layout, Samples
 from mu_addon.studies.measure import Measure
 from mu_addon.studies.record import Record
-from mu_addon.studies.starting import start
 
-
-def recorded(folder, sweeps=4, seed=0, period_s=10.0):
-    """A sensor that bends by 1.25 degrees a kPa, on a gauge of 20 kPa/V; its light is by Beer's law.
-
-    Returns times in s and angles in degrees.
-    """
-    noise = np.random.default_rng(seed)
-    t = np.arange(0, period_s * sweeps, 0.02)
-    kPa = 20.0 - 20.0 * np.cos(2 * np.pi * t / period_s)
-    angle = 1.25 * kPa
-    dark = 0.05 + 0.001 * noise.normal(size=len(t))
-    light = 2.4 * np.exp(-0.006 * angle) + dark + 0.002 * noise.normal(size=len(t))
-    recorder = Recorder(folder, {})
-    values = np.column_stack([light, dark, 0.5 + kPa / 20.0])
-    recorder.write(Samples(Layout(("light", "dark", "gauge"), "V"), t, t, np.arange(len(t)), values), 0.0)
-    recorder.close()
-    return t, angle
+from .bent_sensor import recorded, write_angles
+from .unit_runs import ended
 
 
 @pytest.fixture
 def bench(tmp_path):
-    t, angle = recorded(tmp_path / "bending")
-    lines = "".join(f"{a},{b}\n" for a, b in zip(t, angle, strict=True))
-    (tmp_path / "angles.csv").write_text("time_s,angle_deg\n" + lines)
+    write_angles(tmp_path / "angles.csv", *recorded(tmp_path / "bending"))
     recorded(tmp_path / "unit", sweeps=2, seed=1, period_s=16.0)
     nodes = {
         "Bending": Node("recording", {"folder": str(tmp_path / "bending")}),
@@ -135,15 +113,11 @@ def test_a_recording_is_a_run_of_its_own_take(tmp_path):
 
 def test_a_recording_that_is_stopped_is_none_and_the_next_is_beside_it(tmp_path):
     job = Record(simulated=True, seconds=600.0)
-    with run_to_end(Progress([])) as context:
-        threading.Timer(1.0, os.kill, (os.getpid(), signal.SIGTERM)).start()
-        start(job, tmp_path / "run", context)
-    assert context.status == 143
+    threading.Timer(1.0, os.kill, (os.getpid(), signal.SIGTERM)).start()
+    assert ended(job, tmp_path / "run")[0].status == 143
     assert json.loads((tmp_path / "run" / "summary.json").read_text())["status"] == "cancelled"
     assert (tmp_path / "run" / "recording-1" / "index.ndjson").is_file()
-    with run_to_end(Progress([])) as context:
-        start(Record(simulated=True, seconds=0.3), tmp_path / "other", context)
-    assert context.status == 0
+    assert ended(Record(simulated=True, seconds=0.3), tmp_path / "other")[0].status == 0
     assert Record.read(tmp_path / "run").texts() == job.texts()
 
 

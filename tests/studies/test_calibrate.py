@@ -9,32 +9,10 @@ import numpy as np
 import pytest
 
 from mu_addon.cli.main import main
-from mu_addon.sensing.recording import Recorder, read_recording
-from mu_addon.sensing.samples import Layout, Samples
+from mu_addon.sensing.recording import read_recording
 from mu_addon.sensing.sweeps import _marked
 
-
-def volts_of(angle: np.ndarray) -> np.ndarray:
-    return 2.4 * np.exp(-0.006 * angle)
-
-
-def record(folder: Path, marked: bool = False, sweeps: int = 4) -> np.ndarray:
-    """A recording of some sweeps of 10 s, with dark level; marked: held at known angles that marks tell."""
-    generator = np.random.default_rng(0)
-    t = np.arange(0, 10 * sweeps, 0.02)
-    angle = 25 - 25 * np.cos(2 * np.pi * t / 10)
-    recorder = Recorder(folder, {})
-    if marked:
-        angle = np.round(angle / 10) * 10
-    dark = 0.05 + 0.001 * generator.normal(size=len(t))
-    light = volts_of(angle) + dark + 0.004 * generator.normal(size=len(t))
-    samples = Samples(Layout(("light", "dark"), "V"), t, t, np.arange(len(t)), np.column_stack([light, dark]))
-    recorder.write(samples, 0.0)
-    if marked:
-        for k in np.flatnonzero(np.diff(angle, prepend=-1.0)):
-            recorder.event("mark", float(t[k]), text=f"angle {angle[k]:g}")
-    recorder.close()
-    return angle
+from .bent_sensor import recorded, write_angles
 
 
 def run(*arguments: object) -> int:
@@ -64,13 +42,9 @@ def test_a_sweep_that_failed_does_not_poison_the_next_one_of_the_recording(tmp_p
 
 @pytest.mark.parametrize("marked", [False, True])
 def test_a_recording_is_calibrated(tmp_path: Path, marked: bool, capsys: pytest.CaptureFixture[str]) -> None:
-    angle = record(tmp_path / "bench", marked)
-    more: list[object] = []
-    if not marked:
-        table = np.column_stack([np.arange(len(angle)) * 0.02, angle])
-        lines = "time_s,angle_deg\n" + "".join(f"{t},{a}\n" for t, a in table.tolist())
-        (tmp_path / "angles.csv").write_text(lines)
-        more = ["--angles", tmp_path / "angles.csv"]
+    t, angle = recorded(tmp_path / "bench", marked=marked)
+    write_angles(tmp_path / "angles.csv", t, angle)
+    more = [] if marked else ["--angles", tmp_path / "angles.csv"]
     out = tmp_path / "out"
     status = run(
         "calibrate", tmp_path / "bench", "--channel", "light_V", "--dark", "dark_V", "--out", out, *more
@@ -89,13 +63,13 @@ def test_a_recording_is_calibrated(tmp_path: Path, marked: bool, capsys: pytest.
     assert state["columns"][-4:] == ["angle_deg", "angle_low_deg", "angle_high_deg", "in_range"]
     assert state["latest"][-4] == pytest.approx(angle[-1], abs=2)
     (recording,) = read_recording(again)
-    assert recording.channels == ("light_V", "dark_V")
+    assert recording.channels == ("light_V", "dark_V", "gauge_V")
 
 
 def test_a_recording_that_goes_on_is_the_same_and_other_samples_are_not(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    record(tmp_path / "bench", marked=True)
+    recorded(tmp_path / "bench", marked=True)
     out = tmp_path / "out"
     assert run("calibrate", tmp_path / "bench", "--channel", "light_V", "--out", out) == 0
     recording = tmp_path / "bench" / "recording-000.csv"
@@ -115,7 +89,7 @@ def test_measured_data_with_a_sweep_held_out(tmp_path: Path, capsys: pytest.Capt
     for k in range(5):
         t = np.arange(0, 10, 0.05)
         angle = 25 - 25 * np.cos(2 * np.pi * t / 10)
-        volts = volts_of(angle) + 0.01 * generator.normal(size=len(t))
+        volts = 2.4 * np.exp(-0.006 * angle) + 0.01 * generator.normal(size=len(t))
         rows = "".join(f"{a},{b},{c}\n" for a, b, c in zip(t, angle, volts, strict=True))
         (tmp_path / f"s{k}.csv").write_text("time_s,angle_deg,voltage_V\n" + rows)
         role = "held_out" if k == 4 else "fit"

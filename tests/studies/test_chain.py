@@ -12,7 +12,6 @@ from mu_addon.chain.unit_between_plates import PlateBody
 from mu_addon.cli.main import main
 from mu_addon.errors import InputError
 from mu_addon.studies.chain import Chain
-from mu_addon.studies.starting import kind_of
 
 from ..evidence.hollow_finger import finger
 
@@ -42,15 +41,6 @@ def folder(tmp_path):
     (tmp_path / "chain.toml").write_text(CHAIN)
     (tmp_path / "protocol.csv").write_text(PROTOCOL)
     return tmp_path
-
-
-def test_the_example_reads_and_its_folder_reads_alike(tmp_path):
-    job = Chain.read_file(ROOT / "assets/examples/trunk/chain.toml")
-    assert len(job.units) == 5
-    for name, text in job.texts().items():
-        (tmp_path / name).write_text(text, encoding="utf-8")
-    assert Chain.read(tmp_path).texts() == job.texts()
-    assert kind_of(tmp_path) is Chain
 
 
 def test_equal_units_share_the_range_of_their_pressures(folder):

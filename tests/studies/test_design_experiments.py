@@ -15,13 +15,11 @@ from mu_addon.errors import InputError
 from mu_addon.evidence import unit_fem
 from mu_addon.measured import read_folder
 from mu_addon.measured.kinds import NOISE
-from mu_addon.run.context import run_to_end
-from mu_addon.run.progress import Progress
 from mu_addon.studies.design_experiments import DesignExperiments, NoiseInput, plan
-from mu_addon.studies.starting import start
 from tests.evidence import analytic
 
 from .diagnosis_data import weighed_blocks
+from .unit_runs import ended
 
 
 def planned(count=2, **how):
@@ -73,11 +71,8 @@ def test_what_was_measured_does_not_matter():
 
 
 def test_it_leaves_a_table_and_a_report(tmp_path):
-    progress = Progress()
-    with run_to_end(progress) as context:
-        folder = weighed_blocks(tmp_path / "data", 0.0)
-        study = DesignExperiments(data=read_folder(folder))
-        start(study, tmp_path / "out", context)
+    folder = weighed_blocks(tmp_path / "data", 0.0)
+    context, _ = ended(DesignExperiments(data=read_folder(folder)), tmp_path / "out")
     assert context.status == 0
     # Weighed, the two are no longer one.
     assert not {"overcure", "skin_cure"} <= {n for pair in context.summary["alike"] for n in pair[:2]}
@@ -96,12 +91,10 @@ def test_a_unit_is_simulated_once_and_what_that_leaves_out_is_noted(tmp_path, mo
         return [analytic.response()]
 
     monkeypatch.setattr(unit_fem, "unit_responses", response)
-    messages = []
-    with run_to_end(Progress([messages.append])) as context:
-        measured = read_folder(asset_root() / "examples" / "paper-bending")
-        whole = tuple(e for e in measured.experiments if e.scale == 1.0)
-        study = DesignExperiments(data=attrs.evolve(measured, experiments=whole), self_contact=False)
-        start(study, tmp_path / "out", context)
+    measured = read_folder(asset_root() / "examples" / "paper-bending")
+    whole = tuple(e for e in measured.experiments if e.scale == 1.0)
+    study = DesignExperiments(data=attrs.evolve(measured, experiments=whole), self_contact=False)
+    context, messages = ended(study, tmp_path / "out")
     assert context.status == 0
     assert [m["what"] for m in messages if m["type"] == "warning"] == ["contact with 2 N is left out"]
     assert "<p>contact with 2 N is left out</p>" in (tmp_path / "out" / "report.html").read_text()

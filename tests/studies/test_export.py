@@ -28,24 +28,15 @@ from mu_addon.errors import InputError
 from mu_addon.materials.library import load_material
 from mu_addon.measured.folder import read_folder
 from mu_addon.meshing import gmsh_model
-from mu_addon.run.context import run_to_end
-from mu_addon.run.progress import Progress
 from mu_addon.studies.export import Export, deformed_in
 from mu_addon.studies.inputs import NodePath, path_of
 from mu_addon.studies.specimens import Specimens
-from mu_addon.studies.starting import start
 
 from .bent_motion import ANGLES, PRESSURES, bent, write_bent_motion
+from .unit_runs import ended
 
 SMALL = Unit(name="three", chambers=Chambers(count=3))
 RESIN = load_material("elastic-50a-v1")
-
-
-def run(job, folder):
-    messages = []
-    with run_to_end(Progress([messages.append])) as context:
-        start(job, folder, context)
-    return context, messages
 
 
 def coarse(**inputs):
@@ -55,7 +46,7 @@ def coarse(**inputs):
 @pytest.fixture(scope="module")
 def exported(tmp_path_factory):
     folder = tmp_path_factory.mktemp("export")
-    context, _ = run(coarse(path=window(SMALL, "alpha1")), folder)
+    context, _ = ended(coarse(path=window(SMALL, "alpha1")), folder)
     assert context.status == 0
     return folder, json.loads((folder / "manifest.json").read_text())
 
@@ -66,7 +57,7 @@ def test_the_unit_is_written_as_a_run_bent_it(tmp_path):
     mesh = write_bent_motion(run_of, unit=SMALL)
     (run_of / "unit.toml").write_text(to_toml(SMALL))
     job = coarse(formats=(), deformed=deformed_in(run_of, SMALL, 20.0))
-    context, _ = run(job, tmp_path / "out")
+    context, _ = ended(job, tmp_path / "out")
     assert context.status == 0
     assert Export.read(tmp_path / "out").texts() == job.texts()
     vertices, triangles = stl_surface((tmp_path / "out" / "unit_at_20_kPa.stl").read_bytes())
@@ -245,7 +236,7 @@ def test_without_gmsh_the_rest_is_written(tmp_path, monkeypatch):
         raise gmsh_model.GmshUnavailable("gmsh cannot load libGLU.so.1", remedy="install libglu1-mesa")
 
     monkeypatch.setattr("mu_addon.meshing.step_file.load_gmsh", missing)
-    context, messages = run(coarse(formats=("stl", "step", "txt")), tmp_path)
+    context, messages = ended(coarse(formats=("stl", "step", "txt")), tmp_path)
     assert context.status == 0
     manifest = json.loads((tmp_path / "manifest.json").read_text())
     assert [f["file"] for f in manifest["files"]] == ["unit.stl", "nodes.txt"]
@@ -259,7 +250,7 @@ def test_without_gmsh_the_rest_is_written(tmp_path, monkeypatch):
 def test_a_file_that_is_not_what_was_built_is_an_error(tmp_path, monkeypatch):
     real = surface.stl_bytes
     monkeypatch.setattr(surface, "stl_bytes", lambda v, t: real(v * 1.001, t))
-    context, _ = run(coarse(formats=("stl",)), tmp_path)
+    context, _ = ended(coarse(formats=("stl",)), tmp_path)
     assert context.status == 5
     assert not (tmp_path / "unit.stl").exists()
     assert "read back, encloses" in json.loads((tmp_path / "summary.json").read_text())["reason"]["what"]
@@ -304,7 +295,7 @@ def test_calliper_sheets_become_offsets(tmp_path):
 @pytest.fixture(scope="module")
 def printed(tmp_path_factory):
     folder = tmp_path_factory.mktemp("specimens")
-    context, _ = run(Specimens(unit=Unit(), resin=RESIN, printer=load_printer()), folder)
+    context, _ = ended(Specimens(unit=Unit(), resin=RESIN, printer=load_printer()), folder)
     assert context.status == 0
     return folder, json.loads((folder / "manifest.json").read_text())
 
@@ -401,11 +392,11 @@ def test_the_template_is_a_folder_of_measured_data_but_for_its_rows(printed):
     assert (printed[0] / "report.html").read_text().count("<tr") > 20
     # What is filled in stays when the specimens are written again.
     before = {path.name: path.read_bytes() for path in folder.iterdir()}
-    run(Specimens(unit=Unit(), resin=RESIN, printer=load_printer()), printed[0])
+    ended(Specimens(unit=Unit(), resin=RESIN, printer=load_printer()), printed[0])
     assert {path.name: path.read_bytes() for path in folder.iterdir()} == before
     for scale in (0.75, 1.5):
         unit = attrs.evolve(Unit(), scale=scale)
-        run(Specimens(unit=unit, resin=None, printer=load_printer()), printed[0])
+        ended(Specimens(unit=unit, resin=None, printer=load_printer()), printed[0])
     now = {path.name: path.read_bytes() for path in folder.iterdir()}
     assert {name: now[name] for name in before} == before
     # The resin of the first run is not that of the last.
@@ -413,7 +404,7 @@ def test_the_template_is_a_folder_of_measured_data_but_for_its_rows(printed):
 
 
 def test_vents_for_a_build_direction_are_cut_and_their_plugs_written(tmp_path):
-    context, messages = run(coarse(formats=("stl", "step"), vent_along=(0.0, 0.0, -1.0)), tmp_path)
+    context, messages = ended(coarse(formats=("stl", "step"), vent_along=(0.0, 0.0, -1.0)), tmp_path)
     assert context.status == 0
     manifest = json.loads((tmp_path / "manifest.json").read_text())
     assert "plug-1.stl" in [f["file"] for f in manifest["files"]]
@@ -438,11 +429,11 @@ def test_vents_for_a_build_direction_are_cut_and_their_plugs_written(tmp_path):
 
 def test_no_vent_where_nothing_is_trapped_and_a_reason_where_none_can_be(tmp_path):
     job = coarse(formats=("stl",), vent_along=(0.0, 0.0, 1.0))
-    context, messages = run(job, tmp_path / "up")
+    context, messages = ended(job, tmp_path / "up")
     assert context.status == 0
     assert any("no vent is needed" in m.get("what", "") for m in messages)
     assert not list((tmp_path / "up").glob("plug*"))
-    context, messages = run(attrs.evolve(job, vent_along=(1.0, 0.0, 0.0)), tmp_path / "side")
+    context, messages = ended(attrs.evolve(job, vent_along=(1.0, 0.0, 0.0)), tmp_path / "side")
     assert context.status == 6
     assert "can have no vent" in messages[-1]["what"]
     assert not (tmp_path / "side" / "unit.stl").exists()

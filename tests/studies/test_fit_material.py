@@ -11,31 +11,23 @@ from mu_addon.materials.coupon import incompressible
 from mu_addon.materials.law_forms import FORMS
 from mu_addon.materials.library import read_material
 from mu_addon.measured import read_folder
-from mu_addon.run.context import run_to_end
-from mu_addon.run.progress import Progress
 from mu_addon.studies.fit_material import FitMaterial
-from mu_addon.studies.starting import start
+
+from .unit_runs import ended
 
 DATA = Path(__file__).parent.parent / "data"
 
 
-def job(folder, laws=(), hold_out=(), weights="absolute"):
-    return FitMaterial(data=read_folder(folder), laws=laws, hold_out=hold_out, weights=weights)
-
-
-def run(folder, out, *arguments, **options):
-    messages = []
-    progress = Progress([messages.append])
-    with run_to_end(progress) as context:
-        start(job(folder, *arguments, **options), out, context)
-    return context, messages
+def run(folder, out, **options):
+    context, messages = ended(FitMaterial(data=read_folder(folder), **options), out)
+    assert context.status == 0, messages[-1]
+    return context
 
 
 @pytest.fixture(scope="module")
 def fitted(tmp_path_factory):
     out = tmp_path_factory.mktemp("fit")
-    context, _ = run(DATA / "treloar", out, ("neo-hooke", "yeoh", "ogden-1"), ("equibiaxial",))
-    assert context.status == 0
+    context = run(DATA / "treloar", out, laws=("neo-hooke", "yeoh", "ogden-1"), hold_out=("equibiaxial",))
     return out, context.summary, context.console_summary({})
 
 
@@ -102,8 +94,7 @@ def test_one_mode_alone_brings_a_warning_of_the_others(tmp_path):
     (folder / "experiments.toml").write_text(
         '[[experiment]]\nname = "pull"\nkind = "coupon"\nfile = "pull.csv"\nrole = "fit"\nmode = "uniaxial"\n'
     )
-    context, _ = run(folder, tmp_path / "out", ("yeoh", "ogden-1", "ogden-2"), weights="relative")
-    assert context.status == 0
+    context = run(folder, tmp_path / "out", laws=("yeoh", "ogden-1", "ogden-2"), weights="relative")
     assert set(context.summary["untested"]) == {"equibiaxial", "pure_shear"}
     html = (tmp_path / "out" / "report.html").read_text(encoding="utf-8")
     assert "Equibiaxial was not tested. There, laws that fit the other modes differ by a factor of" in html

@@ -17,9 +17,8 @@ from mu_addon.nodes.comparison import compare
 from mu_addon.nodes.definitions import definitions
 from mu_addon.nodes.graph import Graph
 from mu_addon.nodes.templates import steps_of, template, template_names
-from mu_addon.run.context import run_to_end
-from mu_addon.run.progress import Progress
-from mu_addon.studies.starting import start
+
+from .unit_runs import ended
 
 
 def evaluated(tree, kept=None):
@@ -184,9 +183,7 @@ def test_a_tree_in_its_folder_runs_again_with_its_wishes_and_a_fault_stops_it_be
     with pytest.raises(InputError, match="there is no node 'X'"):
         Graph(tree=tree, wanted=("X",))
     bad = Graph(tree=changed(tree, "W", parameter="chambers.nothing"))
-    with run_to_end(Progress()) as context:
-        start(bad, tmp_path / "out", context)
-    assert context.status == 2
+    assert ended(bad, tmp_path / "out")[0].status == 2
     assert not (tmp_path / "out" / "nodes").exists()
 
 
@@ -213,9 +210,7 @@ def test_a_run_leaves_states_a_table_and_a_report_and_one_failure_does_not_keep_
         "thick": Node("set_parameter", {"value": 3.0}, {"unit": (Source("U", "unit"),)}),
         "C": Node("compare", links={"items": (Source("W0.8", "unit"), Source("W1.0", "unit"))}),
     }
-    messages = []
-    with run_to_end(Progress([messages.append])) as context:
-        start(Graph(tree=NodeTree("walls", nodes)), tmp_path, context)
+    context, messages = ended(Graph(tree=NodeTree("walls", nodes)), tmp_path)
     assert context.status == 2
     assert "node 'thick'" in messages[-1]["where"]
     states = json.loads((tmp_path / "nodes.json").read_text())["nodes"]

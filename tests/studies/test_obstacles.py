@@ -30,16 +30,16 @@ WALL = block((-40, 31.5, 15), (40, 60, 50), "wall.stl")
 
 @pytest.fixture
 def files(tmp_path):
-    """A short unit's TOML, a protocol up and down, and a wall beside the unit."""
+    """A short unit's TOML, a protocol, and a wall beside the unit."""
     unit = to_toml(load_preset("mu-1.0x")).replace("count = 6", "count = 3")
     (tmp_path / "unit.toml").write_text(unit)
-    (tmp_path / "up.csv").write_text("time_s,pressure_kPa\n0,0\n2,8\n4,0\n")
+    (tmp_path / "up.csv").write_text("time_s,pressure_kPa\n0,0\n2,8\n")
     (tmp_path / "wall.stl").write_bytes(stl_bytes(WALL.vertices, WALL.triangles))
     return tmp_path
 
 
 def simulate(files, *more):
-    line = ["simulate", "--unit", files / "unit.toml", "--protocol", files / "up.csv", "--times", 5]
+    line = ["simulate", "--unit", files / "unit.toml", "--protocol", files / "up.csv", "--times", 3]
     line += ["--no-self-contact", "--refine", 0.2, "--out", files / "out", "--json", *more]
     return main([str(word) for word in line]), files / "out"
 
@@ -82,6 +82,7 @@ def test_pictures_show_what_stands_behind_the_cut():
 @pytest.mark.nightly("test_a_unit_that_meets_a_wall")
 def test_paths_are_ranked_beside_a_wall(files, capsys):
     """Each along its whole motion: another answer than that of the free unit, which shortcuts find."""
+    (files / "up.csv").write_text("time_s,pressure_kPa\n0,0\n2,8\n4,0\n")
     line = ["place", "--unit", files / "unit.toml", "--protocol", files / "up.csv", "--times", 5]
     line += ["--no-self-contact", "--refine", 0.2, "--no-mesh-check", "--workers", 1]
     line += ["--out", files / "out", "--json", "--no-report", "--obstacle", files / "wall.stl"]
@@ -109,7 +110,7 @@ def test_a_unit_that_meets_a_wall(files, capsys):
         np.array([float(r[c]) for r in contact])
         for c in ("normal_N", "friction_N", "force_y_N", "gap_error_mm")
     )
-    assert [float(r["pressure_kPa"]) for r in contact] == [0, 4, 8, 4, 0]
+    assert [float(r["pressure_kPa"]) for r in contact] == [0, 4, 8]
     assert normal[0] == 0.0
     assert normal[2] > 0.01
     assert normal[2] == normal.max()
@@ -119,9 +120,8 @@ def test_a_unit_that_meets_a_wall(files, capsys):
     # Where it presses with less than PRESSURE_MPa the gap is off by less than DEPTH_mm.
     assert 0 < error.max() < 2 * DEPTH_mm
     angle = [float(r["angle_deg"]) for r in rows(out, "motion.csv")]
-    # The wall and its friction hold the unit back, also on its way home.
+    # The wall holds the unit back.
     assert angle[2] < 2 * angle[1]
-    assert abs(angle[3] - angle[1]) > 0.01
     summary = json.loads((out / "summary.json").read_text())
     assert summary["contact"]["1 wall.stl"]["friction"] == 0.3
     assert summary["contact"]["1 wall.stl"]["at_kPa"] == 8
@@ -133,26 +133,3 @@ def test_a_unit_that_meets_a_wall(files, capsys):
     newest.unlink()
     assert main(["resume", str(out), "--json", "--no-report"]) == 0
     assert (out / "contact.csv").read_text() == before
-
-
-@pytest.mark.parametrize(
-    ("words", "expected"),
-    [
-        (["--obstacle", "none.stl"], "no body can be read from it"),
-        (["--obstacle", "inside.stl"], "it overlaps the unit by up to"),
-        (["--obstacle", "wall.stl", "--friction", "-1"], "friction = -1 is out of bounds"),
-    ],
-)
-def test_what_cannot_be_an_obstacle_ends_with_what_to_do(files, words, expected, capsys):
-    inside = block((-5, 20, 5), (5, 60, 20))
-    (files / "inside.stl").write_bytes(stl_bytes(inside.vertices, inside.triangles))
-    words = [files / w if w.endswith(".stl") else w for w in words]
-    status, _ = simulate(files, *words)
-    assert status == 2
-    assert expected in capsys.readouterr().out
-
-
-def test_friction_without_its_obstacle_is_refused(files, capsys):
-    with pytest.raises(SystemExit):
-        simulate(files, "--friction", 0.3)
-    assert "after its --obstacle" in capsys.readouterr().err

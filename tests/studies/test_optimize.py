@@ -13,10 +13,9 @@ from mu_addon.optimization.robust_search import observed
 from mu_addon.optimization.robustness import Verified
 from mu_addon.optimization.search import Found, Observed
 from mu_addon.optimization.words import changes, outcome, reasons, verdict
-from mu_addon.run.context import RunContext
-from mu_addon.run.progress import Progress
 from mu_addon.studies.optimize import NO_UNIT, Optimize, mechanics_of
-from mu_addon.studies.starting import start
+
+from .unit_runs import ended
 
 TEXT = """
 format = 1
@@ -66,10 +65,8 @@ def simulated(monkeypatch):
 
 
 def started(study, folder, report=True):
-    context = RunContext(Progress([]))
-    context.wants_report = report
-    start(study, folder, context)
-    context.unlock()
+    context, messages = ended(study, folder, report)
+    assert context.status == 0, messages[-1]
     return context.summary, (folder / "designs.csv").read_text()
 
 

@@ -4,13 +4,14 @@ import pytest
 
 from mu_addon.design.parameters import load_preset, write_unit
 from mu_addon.errors import InputError
-from mu_addon.graph.definition import Call
 from mu_addon.graph.evaluation import Finished
 from mu_addon.nodes.definitions import definitions
 from mu_addon.nodes.parts import Design
 from mu_addon.optimization import read_design
 from mu_addon.studies.chain import Chain
 from mu_addon.studies.optimize import Optimize
+
+from .node_calls import call, order_of
 
 DESIGN = """
 format = 1
@@ -27,18 +28,8 @@ high = 1.4
 UNIT = load_preset("mu-0.75x")
 
 
-def order_of(call):
-    return definitions()[call.node].order(call)
-
-
 def read(call, done):
     return definitions()[call.node].read(call, done)
-
-
-def call(kind, inputs, **settings):
-    definition = definitions()[kind]
-    values = {s.name: s.description.default for s in definition.settings} | settings
-    return Call(kind, {s.name: s.checked(values[s.name]) for s in definition.settings}, inputs)
 
 
 @pytest.fixture

@@ -1,7 +1,7 @@
 """PrusaSlicer reads the exported files as one closed body of the manifest's size and volume.
 
 `--info` writes a section for each file, one `name = value` a line; the numbers of what it had to mend stand
-there only where it mended something. Without PrusaSlicer only the reading of that output is tested.
+there only where it mended something.
 """
 
 import json
@@ -18,35 +18,6 @@ from mu_addon.errors import InputError
 SLICER = next(filter(None, map(shutil.which, ("prusa-slicer", "PrusaSlicer", "prusa-slicer-console"))), None)
 MENDED = ("open_edges", "degenerate_facets", "edges_fixed", "facets_removed", "facets_reversed")
 MENDED += ("facets_added", "backwards_edges")
-
-WHOLE = """\
-[unit.stl]
-size_x = 37.500000
-size_y = 50.000000
-size_z = 81.000000
-min_x = -18.750000
-min_y = -18.750000
-min_z = -6.000000
-max_x = 18.750000
-max_y = 31.250000
-max_z = 75.000000
-number_of_facets = 67732
-manifold = yes
-number_of_parts =  1
-volume = 18629.714844
-"""
-OPEN = """\
-[2026-11-23 10:00:00.000000] [0x00007f] [warning] the mesh was repaired
-[part.stl]
-size_x = 10.000000
-number_of_facets = 11
-manifold = no
-open_edges = 3
-degenerate_facets = 2
-facets_reversed = 4
-number_of_parts =  2
-volume = 900.000000
-"""
 
 
 def units():
@@ -77,26 +48,6 @@ def complaints(info):
     mended = [f"{name} = {info[name]}" for name in MENDED if float(info.get(name, 0)) > 0]
     one = [] if info.get("number_of_parts") == "1" else [f"{info.get('number_of_parts')} parts"]
     return mended + one + ([] if info.get("manifold") == "yes" else ["no manifold"])
-
-
-def test_what_it_says_of_a_file_is_read():
-    (name, info), *more = read_info(WHOLE).items()
-    assert (name, more) == ("unit.stl", [])
-    assert float(info["volume"]) == pytest.approx(18629.714844)
-    assert [float(info[f"size_{axis}"]) for axis in "xyz"] == [37.5, 50.0, 81.0]
-    assert complaints(info) == []
-    two = read_info(WHOLE + OPEN)
-    assert list(two) == ["unit.stl", "part.stl"]
-    assert complaints(two["part.stl"]) == [
-        "open_edges = 3",
-        "degenerate_facets = 2",
-        "facets_reversed = 4",
-        "2 parts",
-        "no manifold",
-    ]
-    # A file that it could not read has no section, and one without a count of parts is no pass.
-    assert read_info("Loading of a model file failed.\n") == {}
-    assert complaints({}) == ["None parts", "no manifold"]
 
 
 @pytest.mark.nightly(

@@ -11,7 +11,6 @@ import pytest
 
 from mu_addon.design.parameters import load_preset
 from mu_addon.errors import InputError
-from mu_addon.graph.definition import Call
 from mu_addon.graph.evaluation import Finished
 from mu_addon.nodes import sweep_nodes
 from mu_addon.nodes.definitions import definitions
@@ -21,11 +20,7 @@ from mu_addon.studies.parameter_study.plan import parse_plan
 from mu_addon.studies.parameter_study.point import run_point
 from mu_addon.studies.sweep import Sweep
 
-
-def call(kind, inputs=None, **settings):
-    definition = definitions()[kind]
-    values = {s.name: s.description.default for s in definition.settings} | settings
-    return Call(kind, {s.name: s.checked(values[s.name]) for s in definition.settings}, inputs or {})
+from .node_calls import call, order_of
 
 
 def range_of(**settings):
@@ -35,10 +30,6 @@ def range_of(**settings):
 def study(*ranges, unit="mu-0.75x", **settings):
     inputs = {"unit": Design(load_preset(unit)), "ranges": tuple((f"r{k}", r) for k, r in enumerate(ranges))}
     return call("sweep", inputs, **settings)
-
-
-def sweep_order(call):
-    return definitions()["sweep"].order(call)
 
 
 def test_names_and_choices_are_those_of_the_parameter_study():
@@ -60,7 +51,7 @@ mesh = { refine = 0.5 }
 """
     walls = range_of(low=0.8, high=1.0, steps=3)
     counts = range_of(parameter="chambers.count", values="4 6")
-    made = sweep_order(study(walls, counts, times=5)).study.plan
+    made = order_of(study(walls, counts, times=5)).study.plan
 
     wanted = parse_plan(text, Path("/"))
     texts = Sweep(plan=made).texts()
@@ -72,14 +63,9 @@ mesh = { refine = 0.5 }
     ]
 
 
-def test_walls_of_units_keep_apart():
-    made = sweep_order(study(range_of())).study.plan
-    assert made.inputs.tables["simulate"]["self_contact"]
-
-
 def test_how_many_studies_at_a_time_decides_no_key_and_a_step_more_does():
     walls = range_of()
-    keys = [sweep_order(study(r, workers=n)).key for r, n in ((walls, 1), (walls, 7), (range_of(steps=4), 1))]
+    keys = [order_of(study(r, workers=n)).key for r, n in ((walls, 1), (walls, 7), (range_of(steps=4), 1))]
     assert keys[0] == keys[1] != keys[2]
 
 
@@ -99,7 +85,7 @@ def test_ranges_that_are_none_are_refused(settings, words):
 
 def test_one_parameter_in_two_ranges_is_refused():
     with pytest.raises(InputError, match=r"chambers\.wall_mm is varied by two"):
-        sweep_order(study(range_of(), range_of(values="0.9")))
+        order_of(study(range_of(), range_of(values="0.9")))
 
 
 def table(tmp_path, rows, *ranges):
@@ -107,7 +93,7 @@ def table(tmp_path, rows, *ranges):
         writer = csv.DictWriter(stream, ["point", "status", "mass_g", "angle_range_deg", "seconds", "what"])
         writer.writeheader()
         writer.writerows(rows)
-    order = sweep_order(study(*ranges))
+    order = order_of(study(*ranges))
     return definitions()["sweep"].read(study(*ranges), Finished(tmp_path, {}, order.study))["table"]
 
 
@@ -144,7 +130,7 @@ def test_a_study_that_starts_at_blenders_entry_gives_the_same_figures(monkeypatc
 
     from mu_addon.blender.jobs import child_main
 
-    plan = sweep_order(study(range_of(), refine=0.4, times=2, stages="design")).study.plan
+    plan = order_of(study(range_of(), refine=0.4, times=2, stages="design")).study.plan
     task = attrs.evolve(plan.task(1), memory_MB=2000, minutes=5.0)
     here = run_point(task)
     monkeypatch.setenv("MU_ENTRY", child_main.__file__)

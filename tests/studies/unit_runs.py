@@ -1,4 +1,4 @@
-"""Runs of a unit's study in a folder, in this process and without its report."""
+"""Runs of studies in a folder, in this process."""
 
 import json
 
@@ -9,12 +9,18 @@ from mu_addon.run.progress import Progress
 from mu_addon.studies.starting import start
 
 
-def ran(job, folder, status=0):
-    """Summary of a study's run and its messages, once it has ended with an exit status."""
+def ended(study, folder, report=True):
+    """The context of a run that has ended, however it did, and its messages."""
     messages = []
     with run_to_end(Progress([messages.append])) as context:
-        context.wants_report = False
-        start(attrs.evolve(job, workers=1), folder, context)
+        context.wants_report = report
+        start(study, folder, context)
+    return context, messages
+
+
+def ran(job, folder, status=0):
+    """Summary of a run without report and its messages, once it has ended with an exit status."""
+    context, messages = ended(attrs.evolve(job, workers=1), folder, report=False)
     assert context.status == status, messages[-1]
     path = folder / "summary.json"
     return json.loads(path.read_text()) if path.is_file() else {}, messages
