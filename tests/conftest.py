@@ -13,7 +13,7 @@ from hypothesis import HealthCheck, settings
 
 from . import costs, nightly
 
-pytest_plugins = ["tests.clogged_chamber", "tests.light_law"]
+pytest_plugins = ["tests.clogged_chamber", "tests.finished_ranking", "tests.light_law"]
 
 # Else each process that a test starts would compile the program anew, half a second, and each of pytest's
 # rewrite all assertions: 20 s instead of 5 to collect.

@@ -169,17 +169,6 @@ def test_print_offset_is_added_and_not_multiplied():
     assert radii == pytest.approx(np.tile([0.8 * 0.75 + 0.1, 0.8 * 1.0 + 0.1], (len(radii), 1)), rel=1e-9)
 
 
-@pytest.mark.nightly("tests/body/test_graded.py::test_an_even_grading_is_other_diameters")
-def test_an_even_grading_is_other_diameters():
-    """The printable solid of factor f everywhere is that of diameters f times as large, drawn otherwise."""
-    graded = build_solid(with_grading(cells="* * *: 0.8"), window(UNIT, "alpha4"))
-    thin = attrs.evolve(UNIT, lattice=Envelope(junction_diameter_mm=1.2, midspan_diameter_mm=1.6))
-    plain = build_solid(thin, window(UNIT, "alpha4"))
-    assert graded.gates.volume_mm3 == pytest.approx(plain.gates.volume_mm3, rel=1e-6)
-    assert graded.gates.area_mm2 == pytest.approx(plain.gates.area_mm2, rel=1e-5)
-    assert graded.gates.genus == plain.gates.genus
-
-
 @pytest.mark.slow
 def test_a_graded_solid_passes_its_gates_and_has_its_struts_volume():
     """Its volume between those of even struts, and nearly as the cells' density integrates."""

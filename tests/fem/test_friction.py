@@ -7,21 +7,17 @@ from scipy.spatial.transform import Rotation
 from mu_addon.errors import ConvergenceError, InputError
 from mu_addon.fem.dead_loads import gravity
 from mu_addon.fem.obstacle import Obstacle
-from mu_addon.fem.rigid import Box, Plane, Pose, Sphere
+from mu_addon.fem.rigid import Plane, Pose, Sphere
 from mu_addon.fem.state import rest
 from mu_addon.fem.time_stepping import simulate_in_time
 from mu_addon.fem.trajectory import simulate
 
 from .bodies import box, hollow_box, touching
 from .derivatives import assert_consistent
+from .test_obstacle import RIGID
 
 E, NU, MU = 1.0, 0.3, 0.3
 LID = Plane((0, 0, 1), (0, 0, -1))
-RIGID = [
-    Plane((0.1, 0.2, 0.9), (0.1, -0.2, -1.0)),
-    Sphere((0.4, 0.6, 1.3), 0.5),
-    Box((1.2, 0.5, 1.1), (0.5, 0.2, 0.4)),
-]
 
 
 def along(time_s, places):
@@ -43,7 +39,10 @@ def simulated_in_time(equilibrium, time_s, pressure_kPa=None):
 @pytest.mark.parametrize("order", [1, 2])
 @pytest.mark.parametrize("rigid", RIGID)
 def test_force_and_tangent_are_derivatives_of_the_energy(rigid, order):
-    """The obstacle turned and moved since the last committed state; points stick, slide, come and go."""
+    """The obstacle turned and moved since the last committed state; points stick, slide, come and go.
+
+    Depths are on both sides of that up to which the penalty grows; the tangent goes through its sparsity.
+    """
     mesh = box((2, 2, 2), order=order, jiggle=0.2, clamp=True)
     obstacle = Obstacle(mesh, rigid, 0.3, 0.02, friction=0.4, stick_mm=0.01)
     eq = touching(mesh, obstacle)
@@ -55,6 +54,7 @@ def test_force_and_tangent_are_derivatives_of_the_energy(rigid, order):
     obstacle.pose = Pose(Rotation.from_rotvec((0.01, -0.02, 0.015)).as_matrix(), (0.02, -0.03, 0.05))
     obstacle.update_lag(u + 0.005 * random.standard_normal(u.shape))
     assert 0.05 < obstacle.contact(u).sticking < 0.95
+    assert obstacle.deepest_mm(u) > 0.02
     assert_consistent(model, m, u, random, 1e-7)
 
 

@@ -9,6 +9,7 @@ import subprocess
 import sys
 from pathlib import Path
 
+import attrs
 import numpy as np
 
 from mu_addon.cli.main import main
@@ -27,11 +28,13 @@ UNIT = load_preset("mu-1.0x").evolve(count=3)
 MILD = Protocol(np.arange(4.0), np.array([0.0, -1.0, 0.0, 2.0]))
 
 
-def coarse(folder, unit=UNIT, **changes):
+JOB = UnitStudy(unit=UNIT, protocol=MILD, mesh=MeshSettings(refine=0.35), times=4, stations=11)
+
+
+def coarse(folder, **changes):
     """Write the main job, small, into a folder, and return the command that runs it."""
     folder.mkdir(parents=True, exist_ok=True)
-    small = {"mesh": MeshSettings(refine=0.35), "times": 4, "stations": 11}
-    write_study(UnitStudy(unit=unit, protocol=MILD, **(small | changes)), folder)
+    write_study(attrs.evolve(JOB, **changes), folder)
     return "resume", folder
 
 

@@ -64,7 +64,7 @@ BY_NIGHT = pytest.mark.nightly("test_every_example_names_what_there_is")
 @pytest.mark.slow
 @pytest.mark.parametrize(
     "number",
-    [pytest.param(n, marks=BY_NIGHT) if n in (1, 3) else n for n in range(1, len(EXAMPLES))],
+    [pytest.param(n, marks=BY_NIGHT) if n in (1, 2, 3) else n for n in range(1, len(EXAMPLES))],
 )
 def test_the_other_examples_print_what_the_page_shows(number, printed):
     code, shown = EXAMPLES[number]

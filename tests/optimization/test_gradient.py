@@ -1,5 +1,7 @@
 """Gradients of a printed unit, with a sensor, and with its walls in contact, against full solutions."""
 
+from functools import cache
+
 import attrs
 import numpy as np
 import pytest
@@ -31,6 +33,11 @@ FREE = [
     Freedom("chambers.wall_factors[2]", 0.6, 1.5),
     Freedom("chambers.cell_mm", 10.0, 15.0, also={"chambers.bladder_diameter_mm": 2.0}),
 ]
+
+
+@cache
+def coarse():
+    return UnitBody(UNIT, Mechanics(COARSE))
 
 
 def full(body, freedom, value, asked):
@@ -82,10 +89,9 @@ def test_they_are_those_of_full_solutions_strut_by_strut(free):
 
 @pytest.mark.nightly("test_a_unit_scales_without_bending_otherwise")
 def test_they_are_those_of_full_solutions_by_the_resin():
-    body = UnitBody(UNIT, Mechanics(COARSE))
     asked = [Angle("angle", 8.0), AirVolume("air", 8.0)]
-    states, _ = solve(body.structure, asked[0].conditions)
-    assert largest_error(body, states, FREE[4:5], asked, share=5e-4) < 1e-4
+    states, _ = solve(coarse().structure, asked[0].conditions)
+    assert largest_error(coarse(), states, FREE[4:5], asked, share=5e-4) < 1e-4
 
 
 @pytest.mark.nightly(
@@ -101,23 +107,20 @@ def test_they_are_those_of_full_solutions_where_walls_touch():
     assert largest_error(body, states, FREE[:4:2], asked, share=1e-5) < 1e-4
 
 
+EVERY = pytest.mark.nightly("test_those_of_a_sensor_are_those_of_full_solutions")
+OFFSET = Freedom("print.offset_xy_mm", -0.3, 0.5)
+
+
 @pytest.mark.slow
-def test_those_of_a_sensor_are_those_of_full_solutions():
-    body = UnitBody(UNIT, Mechanics(COARSE))
-    asked = [Disturbance("J", "alpha1", (2.5,)), SensorSlope("slope", "alpha1", (2.5,))]
-    states, _ = solve(body.structure, {c for q in asked for c in q.conditions})
-    assert largest_error(body, states, FREE[:1], asked) < 1e-4
-
-
-@pytest.mark.nightly("test_those_of_a_sensor_are_those_of_full_solutions")
 @pytest.mark.parametrize(
-    "freedom", [*FREE[1:4], Freedom("print.offset_xy_mm", -0.3, 0.5)], ids=lambda f: f.name
+    "freedom",
+    [FREE[0], *(pytest.param(f, marks=EVERY) for f in FREE[1:4]), pytest.param(OFFSET, marks=EVERY)],
+    ids=lambda freedom: freedom.name,
 )
-def test_those_of_a_sensor_follow_every_freedom(freedom):
-    body = UnitBody(UNIT, Mechanics(COARSE))
+def test_those_of_a_sensor_are_those_of_full_solutions(freedom):
     asked = [Disturbance("J", "alpha1", (2.5,)), SensorSlope("slope", "alpha1", (2.5,))]
-    states, _ = solve(body.structure, {c for q in asked for c in q.conditions})
-    assert largest_error(body, states, [freedom], asked) < 1e-4
+    states, _ = solve(coarse().structure, {c for q in asked for c in q.conditions})
+    assert largest_error(coarse(), states, [freedom], asked) < 1e-4
 
 
 def test_a_path_without_room_for_a_sensor_is_an_answer(monkeypatch):
@@ -135,7 +138,7 @@ def test_a_path_without_room_for_a_sensor_is_an_answer(monkeypatch):
 def test_a_unit_scales_without_bending_otherwise():
     """Without a length of its own an elastic body's angle does not change, and its stiffness grows with
     it."""
-    body = UnitBody(UNIT, Mechanics(COARSE))
+    body = coarse()
     asked = [Angle("angle", 2.5), AirVolume("air"), *(RestStiffness(axis, axis) for axis in "xyz")]
     states, _ = solve(body.structure, asked[0].conditions)
     values = [q.value(body.structure, states) for q in asked]

@@ -145,53 +145,32 @@ def recording(folder: Path, context: RunContext) -> None:
     stream(Prepared(), folder, seconds=None, about={}, context=context)
 
 
-def test_record(tmp_path: Path, for_good: bool) -> None:
-    status, _ = ran(recording, tmp_path / "whole")
+@pytest.mark.parametrize(("layer", "status", "fewest"), [(failing, 5, 50), (any_array, MuError.status, 20)])
+def test_record(tmp_path: Path, for_good: bool, layer: Any, status: int, fewest: int) -> None:
+    ended, _ = ran(recording, tmp_path / "whole")
     whole = rows_of(tmp_path / "whole")
-    assert (status, [len(part) for part in whole]) == (0, [30, 30])
-    for at in range(1, 500):
+    assert (ended, [len(part) for part in whole]) == (0, [30, 30])
+    for at in range(1, 1000):
         folder = tmp_path / f"at-{at}"
-        with failing(folder, at, for_good) as files:
-            status, messages = ran(recording, folder)
-        if at > len(files.calls):
-            assert at > 50
+        with layer(folder, at, for_good) as met:
+            ended, messages = ran(recording, folder)
+        if at > met.places:
+            assert at > fewest
             return
-        where = f"{at}, {files.calls[at - 1]}"
-        wrong = list(faults(folder, (status, messages), None, 5))
+        wrong = list(faults(folder, (ended, messages), None, status))
         if (folder / "index.ndjson").exists():
             lines_of(folder / "index.ndjson")
             found = rows_of(folder)
             pairs = zip(found, whole, strict=False)
             wrong += [f"{len(part)} rows" for part, every in pairs if part != every[: len(part)]]
-            if status == 0 and found != whole:
+            if ended == 0 and found != whole:
                 wrong.append("rows are missing")
             wrong += [f"left behind: {path.name}" for path in folder.glob("live-*")]
             # What is recorded is never written over.
-            status, messages = ran(recording, folder)
-            if status != 2 or "already contains a recording" not in messages[-1]["what"]:
-                wrong.append(f"again: exit status {status}, {messages[-1]}")
+            ended, messages = ran(recording, folder)
+            if ended != 2 or "already contains a recording" not in messages[-1]["what"]:
+                wrong.append(f"again: exit status {ended}, {messages[-1]}")
         elif ran(recording, folder)[0] or rows_of(folder) != whole:
             wrong.append("again: not the same rows")
-        assert wrong == [], where
-    raise AssertionError("the run never came to its end")
-
-
-def test_record_short_of_memory(tmp_path: Path) -> None:
-    assert ran(recording, tmp_path / "whole")[0] == 0
-    whole = rows_of(tmp_path / "whole")
-    for at in range(1, 1000):
-        folder = tmp_path / f"at-{at}"
-        with any_array(folder, at, at % 2 == 0) as memory:
-            status, messages = ran(recording, folder)
-        if at > memory.places:
-            assert at > 20
-            return
-        wrong = list(faults(folder, (status, messages), None, MuError.status))
-        if (folder / "index.ndjson").exists():
-            found = rows_of(folder)
-            pairs = zip(found, whole, strict=False)
-            wrong += [f"{len(part)} rows" for part, every in pairs if part != every[: len(part)]]
-            if status == 0 and found != whole:
-                wrong.append("rows are missing")
-        assert wrong == [], f"{at}, {memory.where}"
+        assert wrong == [], f"{at}, {met.where}"
     raise AssertionError("the run never came to its end")

@@ -1,19 +1,17 @@
 """What evidence named, in a designer's simulation: as the evidence computes it, kept, refused, resumed."""
 
-import functools
 import json
-import shutil
 
 import attrs
 import numpy as np
 import pytest
 
 from mu_addon.body.printed_mesh import mesh_printed
-from mu_addon.cli.main import main, parser
+from mu_addon.cli.main import parser
 from mu_addon.cli.objects import modelled
 from mu_addon.design import shapes
 from mu_addon.design.body import body_of
-from mu_addon.design.parameters import load_preset, to_toml
+from mu_addon.design.parameters import load_preset
 from mu_addon.design.rigid_body import RigidBody
 from mu_addon.errors import InputError
 from mu_addon.evidence.effects import STATIC as EFFECTS
@@ -175,57 +173,23 @@ def test_beside_obstacles_weight_acts_from_the_first_instant_on(mesh):
         np.testing.assert_allclose(state.u, free.states[k].u, atol=1e-6)
 
 
-PLACED = {
-    "weight": with_effects(90.0, gravity=1300.0),
-    "stiffening": with_effects(strain_stiffening=0.4),
-}
-
-
-@pytest.fixture(scope="module")
-def placed(tmp_path_factory, with_light):
-    """Folder, summary and job of one of `PLACED`, by its name, once it is asked for."""
-    root = tmp_path_factory.mktemp("placed")
-
-    @functools.cache
-    def of(name):
-        return root / name, ran(PLACED[name], with_light(root / name)), PLACED[name]
-
-    return of
-
-
 @pytest.mark.slow
-@pytest.mark.parametrize(
-    "name",
-    [
-        "weight",
-        pytest.param(
-            "stiffening",
-            marks=pytest.mark.nightly("test_sensor_paths_are_ranked_in_the_unit_that_has_the_effect"),
-        ),
-    ],
-)
-def test_sensor_paths_are_ranked_in_the_unit_that_has_the_effect(placed, name):
+def test_sensor_paths_are_ranked_in_a_unit_that_weighs_something(tmp_path, with_light):
     """A candidate started from Model A's states is where its own path from no pressure leads it."""
-    folder, found, _ = placed(name)
-    J = found["J_hat_mm"]
-    figures = found["sweep"]
-    assert figures["path_difference_mm"] < 0.02 * J["alpha1"]
-    # Under its weight a unit with a sensor hangs otherwise; without weight everything is as drawn.
-    with np.load(folder / "delta.npz") as stored:
-        at_rest = stored["delta_mm"][0, 0].mean()
-    assert at_rest > 1e-3 if name == "weight" else at_rest == 0
-    assert (folder / "sensitivity.vtu").is_file()
+    found = ran(with_effects(90.0, gravity=1300.0), with_light(tmp_path))
+    assert found["sweep"]["path_difference_mm"] < 0.02 * found["J_hat_mm"]["alpha1"]
+    # Under its weight a unit with a sensor hangs otherwise.
+    with np.load(tmp_path / "delta.npz") as stored:
+        assert stored["delta_mm"][0, 0].mean() > 1e-3
+    assert (tmp_path / "sensitivity.vtu").is_file()
     # Light is told about the angle without pressure.
     for low, high in found["light"]["monotonic_deg"].values():
         assert low <= found["angle_deg"]["0"] <= high
+    assert found["study"]["orientation_deg"] == 90.0
+    assert found["study"]["effects"] == named(gravity=1300.0)
 
 
-def test_another_size_or_direction_is_another_result_and_no_weight_has_no_direction(placed, tmp_path):
-    folder, found, _ = placed("weight")
-    copy = shutil.copytree(folder, tmp_path / "changed")
-    other = ran(attrs.evolve(with_effects(0.0, gravity=1300.0), stages=("design", "simulate")), copy)
-    assert other["angle_deg"]["0"] != found["angle_deg"]["0"]
-    assert (copy / "stale" / "deviation.csv").is_file()
+def test_another_size_or_direction_is_another_study_and_no_weight_has_no_direction():
     keys = {
         json.dumps(with_effects(turn, gravity=density).tables)
         for turn in (0.0, 90.0, 450.0 - 360.0)
@@ -293,26 +257,6 @@ def test_a_clog_is_refused_where_the_whole_lattice_is_searched():
         with_effects(job=attrs.evolve(JOB, paths="graph"), clogged_chamber=0.5)
 
 
-def test_the_command_line_simulates_what_a_diagnosis_found(tmp_path, capsys, mesh):
-    path = model_file(tmp_path / "model.toml", gravity=1300.0, strain_stiffening=0.4)
-    (tmp_path / "up.csv").write_text("time_s,pressure_kPa\n0,0\n1,2\n")
-    (tmp_path / "unit.toml").write_text(to_toml(SHORT))
-    line = ["simulate", "--unit", tmp_path / "unit.toml", "--out", tmp_path / "out", "--json", "--times", 2]
-    line += ["--protocol", tmp_path / "up.csv", "--refine", 0.35, "--no-self-contact"]
-    assert main([str(word) for word in [*line, "--model", path, "--orientation", 90]]) == 0
-    summary = json.loads((tmp_path / "out" / "summary.json").read_text())
-    job = with_effects(90.0, gravity=1300.0, strain_stiffening=0.4)
-    _, angles = moved(job, mesh)
-    assert list(summary["angle_deg"].values()) == pytest.approx(angles, rel=1e-9)
-    assert summary["study"]["orientation_deg"] == 90.0
-    assert summary["study"]["effects"] == named(gravity=1300.0, strain_stiffening=0.4)
-    assert len(summary["model"]["applied"]) == 2
-    report = (tmp_path / "out" / "report.html").read_text()
-    assert "effects.gravity.density_kg_m3" in report
-    assert "gravity turned 90° about x" in report
-    assert "not applied" not in capsys.readouterr().out
-
-
 def given(*words, whole=True):
     """What a command makes of its options --preset and --model, its summary, and what it warns of."""
     messages = []
@@ -323,15 +267,16 @@ def given(*words, whole=True):
     return found, context.summary, [m["what"] for m in messages if m.get("type") == "warning"]
 
 
-def test_a_direction_of_nothing_that_weighs_is_told(tmp_path):
+def test_options_give_what_a_diagnosis_found_and_a_direction_of_nothing_that_weighs_is_told(tmp_path):
     path = model_file(tmp_path / "model.toml", clogged_chamber=0.3)
     (unit, effects), _, warned = given("simulate", "--model", path, "--orientation", "90")
     assert unit == UNIT
     assert effects.tables == {"effects": named(clogged_chamber=0.3)}
     assert warned == ["gravity is not part of this model, so the orientation has no effect"]
-    path = model_file(tmp_path / "model.toml", gravity=1000.0)
-    (_, effects), _, warned = given("place", "--model", path, "--orientation", "90")
-    assert effects == NamedEffects(named(gravity=1000.0), 90.0)
+    path = model_file(tmp_path / "model.toml", gravity=1000.0, strain_stiffening=0.4)
+    (_, effects), summary, warned = given("place", "--model", path, "--orientation", "90")
+    assert effects == NamedEffects(named(gravity=1000.0, strain_stiffening=0.4), 90.0)
+    assert len(summary["model"]["applied"]) == 2
     assert not warned
 
 
@@ -427,6 +372,7 @@ def test_in_time_the_unit_stands_where_the_evidence_has_it(name):
     np.testing.assert_allclose(found, expected[::10], atol=2e-9 if name != "leak" else 1e-9)
 
 
+@pytest.mark.nightly("test_in_time_the_unit_stands_where_the_evidence_has_it")
 def test_a_wall_that_relaxes_creeps_on_and_comes_back(tmp_path):
     """A step of pressure held: the bending goes from that of the modulus at once to that after long."""
     job = attrs.evolve(in_time("viscoelasticity"), protocol=MILD, times=7, stages=("design", "simulate"))
@@ -443,16 +389,6 @@ def test_a_wall_that_relaxes_creeps_on_and_comes_back(tmp_path):
     assert summary["angle_deg"]["2"] == pytest.approx(rows["angle_deg"][1], rel=1e-5)
     shown = np.load(tmp_path / "motion/model_a.npz")
     np.testing.assert_allclose(shown["pressure_kPa"], rows["pressure_kPa"])
-
-
-@pytest.mark.nightly("test_sensor_paths_are_ranked_in_the_unit_that_has_the_effect")
-def test_place_goes_on_where_the_unit_relaxes(tmp_path):
-    job = attrs.evolve(in_time("viscoelasticity"), protocol=MILD, times=7)
-    ran(job, tmp_path)
-    delta = np.load(tmp_path / "delta.npz")
-    assert delta["pressure_kPa"].max() == 2.0
-    worst = delta["delta_mm"].max(axis=(0, 2))
-    assert (np.diff(worst[1:4]) > 0).all()
 
 
 def test_a_mechanism_found_in_two_kinds_acts_by_the_parameters_of_the_unit():

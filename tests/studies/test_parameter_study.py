@@ -19,7 +19,7 @@ from mu_addon.design.parameters import from_toml, load_preset, to_toml
 from mu_addon.errors import InputError, MuError
 from mu_addon.run import cluster as cluster_module
 from mu_addon.run import execution
-from mu_addon.run.child import RUNNING, Child
+from mu_addon.run.child import Child
 from mu_addon.run.context import run_to_end
 from mu_addon.run.progress import Progress
 from mu_addon.run.study import stage
@@ -28,6 +28,8 @@ from mu_addon.studies.parameter_study.plan import parse_plan, read_plan
 from mu_addon.studies.parameter_study.point import Outcome, Task, run_point
 from mu_addon.studies.starting import start
 from mu_addon.studies.sweep import Sweep
+
+from .unit_runs import ended
 
 ROOT = Path(__file__).resolve().parents[2]
 FAKE = str(Path(__file__).resolve().parents[1] / "run" / "fake_worker.py")
@@ -69,13 +71,11 @@ def by_formula(monkeypatch):
     monkeypatch.setattr(point_module, "run_point", formula)
 
 
-def swept(text, folder, add=0, status=0, **options):
-    messages = []
+def swept(text, folder, add=0, **options):
     asked.clear()
-    with run_to_end(Progress([messages.append])) as context:
-        plan = parse_plan(text, folder).continued(folder / "sweep.toml", add)
-        start(Sweep(plan=plan, workers=1, **options), folder, context)
-    assert context.status == status, messages[-1]
+    plan = parse_plan(text, folder).continued(folder / "sweep.toml", add)
+    context, messages = ended(Sweep(plan=plan, workers=1, **options), folder)
+    assert context.status == 0, messages[-1]
     return list(csv.DictReader((folder / "points.csv").open(newline=""))), messages
 
 
@@ -216,19 +216,6 @@ def _alive(pid):
     return Path(f"/proc/{pid}/stat").exists() and Path(f"/proc/{pid}/stat").read_text().split()[2] != "Z"
 
 
-def test_child_runs_of_the_command_line_end_with_their_parent_and_tell_their_error(tmp_path):
-    environment = os.environ | {"PYTHONPATH": str(ROOT)}
-    command = [sys.executable, "-m", "mu_addon.cli", "resume", str(tmp_path), "--json", "--no-report"]
-    child = Child(command, tmp_path / "words", environment, ends_with_parent=True)
-    end = time.monotonic() + PATIENCE_S
-    while child.state == RUNNING:
-        assert time.monotonic() < end
-        child.poll()
-        time.sleep(0.05)
-    assert "this folder contains no study" in child.error["what"]
-    assert child.error["status"] == 2
-
-
 def test_a_sweep_that_stops_ends_its_study_at_once(monkeypatch):
     children = []
 
@@ -249,17 +236,14 @@ def test_a_sweep_that_stops_ends_its_study_at_once(monkeypatch):
 
 def test_a_real_study_is_swept(tmp_path):
     (tmp_path / "unit.toml").write_text(to_toml(load_preset("mu-1.0x").evolve(count=3)))
-    (tmp_path / "mild.csv").write_text("time_s,pressure_kPa\n0,0\n1,2\n")
-    text = TEXT.replace("{ low = 0.8, high = 1.2 }", "{ values = [0.9] }").replace("0.4", "0.25")
-    text = text.replace("points = 6", "points = 2").replace('"latin_hypercube"', '"grid"')
-    text = text.replace('preset = "mu-1.0x"', 'unit = "unit.toml"\nprotocol = "mild.csv"')
-    text = text.replace("times = 3", "times = 2\nself_contact = false").replace(
-        "memory_MB = 2000", "memory_MB = 4000"
-    )
+    text = TEXT.replace("{ low = 0.8, high = 1.2 }", "{ values = [0.9] }")
+    text = text.replace('preset = "mu-1.0x"', 'unit = "unit.toml"').replace('"latin_hypercube"', '"grid"')
+    text = text.replace('"simulate"', '"design"').replace('maximize = ["angle_range_deg"]\n', "")
+    text = text.replace("[simulate]\ntimes = 3\nmesh = { refine = 0.4 }\n", "")
     (row,), _ = swept(text, tmp_path)
     assert row["status"] == "done"
-    assert float(row["angle_range_deg"]) > 0.1
-    assert 200 < float(row["memory_MB"]) < 4000
+    assert 5.0 < float(row["mass_g"]) < 15.0
+    assert 100 < float(row["memory_MB"]) < 2000
 
 
 # A real scheduler and its workers, on this machine's loopback.
@@ -293,17 +277,8 @@ class Farm:
         return self._start("scheduler", "--host", "127.0.0.1", "--port", str(self.port), "--no-dashboard")
 
     def worker(self):
-        words = (
-            "--nthreads",
-            "1",
-            "--no-nanny",
-            "--no-dashboard",
-            "--host",
-            "127.0.0.1",
-            "--death-timeout",
-            "3600",
-        )
-        return self._start("worker", self.address, *words)
+        words = "--nthreads 1 --no-nanny --no-dashboard --host 127.0.0.1 --death-timeout 3600"
+        return self._start("worker", self.address, *words.split())
 
     def close(self):
         for process in self.processes:
@@ -375,10 +350,8 @@ def test_a_lost_worker_and_a_restarted_scheduler_lose_no_point(farm, tmp_path):
 def test_a_scheduler_that_is_not_there_is_told(tmp_path, monkeypatch):
     pytest.importorskip("distributed", reason="an extra")
     monkeypatch.setattr(cluster_module, "PATIENCE_S", 4.0)
-    messages = []
-    with run_to_end(Progress([messages.append])) as context:
-        job = Sweep(plan=parse_plan(TEXT, tmp_path), scheduler=f"tcp://127.0.0.1:{free_port()}")
-        start(job, tmp_path / "out", context)
+    job = Sweep(plan=parse_plan(TEXT, tmp_path), scheduler=f"tcp://127.0.0.1:{free_port()}")
+    context, messages = ended(job, tmp_path / "out")
     assert context.status == 1
     assert "no scheduler answers" in messages[-1]["what"]
     assert "dask scheduler" in messages[-1]["what_to_do"]

@@ -1,52 +1,11 @@
-"""Plans of runs: the stages that a command tells at its start are those that come, and its share grows."""
+"""Plans of runs: what makes a stage take longer."""
 
 import attrs
 import pytest
 
-from mu_addon.cli.main import main
-from mu_addon.design.parameters import Unit, load_preset, to_toml
-from mu_addon.run import progress
+from mu_addon.design.parameters import Unit
 from mu_addon.simulate_and_place.expected import CROSSING, TOUCHING, Size, work
 from mu_addon.studies.unit_ranking import UnitStudy
-
-STUDY = ["--no-self-contact", "--refine", "0.35", "--times", "3"]
-SMALL = load_preset("mu-0.75x").evolve(count=3)
-MILD = "time_s,pressure_kPa\n0,0\n1,2\n2,0\n"
-
-
-def messages_of(monkeypatch, tmp_path, words):
-    """Every message of a command."""
-    found = []
-    monkeypatch.setattr(progress, "terminal", lambda stream: found.append)
-    assert main([*words, "--out", str(tmp_path / "out"), "--no-report"]) == 0
-    return found
-
-
-@pytest.mark.slow
-@pytest.mark.parametrize(
-    "words",
-    [
-        pytest.param(
-            ["design", "--preset", "mu-0.75x", "--path", "alpha4"],
-            marks=pytest.mark.nightly("test_a_command_does_what_it_planned"),
-        ),
-        ["simulate", "--unit", "unit.toml", "--protocol", "mild.csv", *STUDY],
-    ],
-    ids=lambda words: words[0],
-)
-def test_a_command_does_what_it_planned(monkeypatch, tmp_path, words):
-    files = {"unit.toml": to_toml(SMALL), "mild.csv": MILD}
-    for name, text in files.items():
-        (tmp_path / name).write_text(text)
-    words = [str(tmp_path / word) if word in files else word for word in words]
-    found = messages_of(monkeypatch, tmp_path, words)
-    (plan,) = (m for m in found if m["type"] == "plan")
-    told = [m for m in found if m["type"] == "progress"]
-    assert {m["stage"] for m in told} <= {name for name, _ in plan["stages"]}
-    shares = [m["whole"] for m in told]
-    assert shares == sorted(shares)
-    left = [m["whole_seconds_left"] for m in told if not m.get("why")]
-    assert all(seconds is not None for seconds in left)
 
 
 @pytest.mark.parametrize(("apart", "suction"), [(False, 1.0), (True, TOUCHING["candidates"])])

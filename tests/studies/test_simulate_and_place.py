@@ -3,6 +3,7 @@
 import csv
 import json
 import shutil
+from xml.etree import ElementTree
 
 import attrs
 import meshio
@@ -17,25 +18,19 @@ from mu_addon.meshing.mesh import MEMBRANE
 from mu_addon.meshing.settings import MeshSettings
 from mu_addon.report.motion_files import read_motion
 from mu_addon.run.context import RunContext
+from mu_addon.run.kept_results import Results
 from mu_addon.run.progress import Progress
 from mu_addon.simulate_and_place.expected import BYTES, BYTES_A_NODE, expected_nodes
 from mu_addon.studies.starting import start
 from mu_addon.studies.unit_ranking import UnitStudy
 from tests.design.kinds import custom, octet
 
+from ..headless.processes import JOB
 from . import unit_runs
 
 UNIT = load_preset("mu-1.0x")
-# Three chambers, one path: as many stages as six and ten have.
-JOB = UnitStudy(
-    unit=UNIT.evolve(count=3),
-    protocol=Protocol(np.arange(3.0), np.array([0.0, -1.0, 2.0])),
-    mesh=MeshSettings(refine=0.35),
-    times=3,
-    stations=11,
-    mesh_check=False,
-    workers=1,
-)
+MOTION = attrs.evolve(JOB, stages=("design", "simulate"))
+THICKER = JOB.unit.evolve(wall_mm=1.0)
 
 
 def ran(job, folder):
@@ -43,41 +38,44 @@ def ran(job, folder):
     return unit_runs.ran(job, folder)[0]
 
 
-def read_rows(path):
-    with open(path, newline="", encoding="utf-8") as stream:
-        return list(csv.DictReader(stream))
-
-
-@pytest.fixture(scope="module")
-def placed(tmp_path_factory, with_light):
-    folder = with_light(tmp_path_factory.mktemp("study") / "placed")
-    return folder, ran(JOB, folder)
-
-
 @pytest.fixture
-def copied(placed, tmp_path):
-    folder, summary = placed
-    return shutil.copytree(folder, tmp_path / "copied"), summary
+def copied(finished, tmp_path):
+    folder = shutil.copytree(finished, tmp_path / "copied")
+    return folder, json.loads((folder / "summary.json").read_text())
 
 
-def test_its_motion_is_a_table_over_time(placed):
+def test_its_motion_is_a_table_over_time(finished):
     """Angle, tip and volume at each instant, and for ParaView what bears the pressure."""
-    folder, summary = placed
-    rows = np.genfromtxt(folder / "motion.csv", delimiter=",", names=True)
+    angles = json.loads((finished / "summary.json").read_text())["angle_deg"]
+    rows = np.genfromtxt(finished / "motion.csv", delimiter=",", names=True)
     assert rows["pressure_kPa"].tolist() == JOB.protocol.pressure_kPa.tolist()
     for row in rows:
-        assert row["angle_deg"] == pytest.approx(summary["angle_deg"][f"{row['pressure_kPa']:g}"], abs=1e-4)
-    rest, sucked, blown = rows
+        assert row["angle_deg"] == pytest.approx(angles[f"{row['pressure_kPa']:g}"], abs=1e-4)
+    rest, sucked, _, blown = rows
     # The tip is on the sagittal plane, at its height at rest; air goes out, comes in, and the tip rises.
-    assert rows["tip_x_mm"].tolist() == [0.0, 0.0, 0.0]
+    assert not rows["tip_x_mm"].any()
     assert rest["tip_z_mm"] == pytest.approx(JOB.unit.dimensions.height)
     assert sucked["tip_z_mm"] < rest["tip_z_mm"] < blown["tip_z_mm"]
     assert sucked["volume_mm3"] < rest["volume_mm3"] < blown["volume_mm3"]
-    still, _, moved = (meshio.read(folder / "model_a" / f"000{k}.vtu") for k in range(3))
+    steps = ElementTree.parse(finished / "model_a.pvd").getroot().findall("Collection/DataSet")
+    still, *_, moved = (meshio.read(finished / step.get("file")) for step in steps)
+    assert len(steps) == 4
+    assert {block.type for block in moved.cells} == {"tetra10"}
+    assert np.abs(moved.point_data["displacement_mm"]).max() > 0.1
     assert still.cell_data["largest_stretch"][0] == pytest.approx(1.0)
     assert still.cell_data["von_mises_kPa"][0] == pytest.approx(0.0, abs=1e-6)
     in_wall = moved.cell_data["region"][0] == MEMBRANE
     assert (moved.cell_data["von_mises_kPa"][0][in_wall] > 0.0).all()
+
+
+def test_it_does_what_it_planned(finished):
+    messages = [json.loads(line) for line in (finished / "log.ndjson").read_text().splitlines()]
+    (plan,) = (m for m in messages if m["type"] == "plan")
+    told = [m for m in messages if m["type"] == "progress"]
+    assert {m["stage"] for m in told} <= {name for name, _ in plan["stages"]}
+    shares = [m["whole"] for m in told]
+    assert shares == sorted(shares)
+    assert all(m["whole_seconds_left"] is not None for m in told if not m.get("why"))
 
 
 def test_its_solid_is_said_in_mm_ml_and_g(tmp_path):
@@ -97,68 +95,77 @@ def times(folder, kind):
     return {path.name: path.stat().st_mtime_ns for path in (folder / "cache").glob(f"{kind}-*")}
 
 
-def with_wall(job, wall_mm):
-    return attrs.evolve(
-        job, unit=attrs.evolve(job.unit, chambers=attrs.evolve(job.unit.chambers, wall_mm=wall_mm))
-    )
-
-
-def with_resin(job, **changes):
-    return attrs.evolve(job, unit=job.unit.evolve(**changes))
-
-
 COSTS = pytest.mark.nightly("test_a_change_costs_only_what_depends_on_it")
 
 
 @pytest.mark.parametrize(
-    ("change", "mesh", "states"),
+    ("change", "meshes", "states"),
     [
-        (lambda job: job, 1, 2),
-        pytest.param(lambda job: attrs.evolve(job, stations=12), 1, 2, marks=COSTS),
-        (lambda job: attrs.evolve(job, protocol=Protocol(np.arange(2.0), np.array([0.0, 1.5]))), 1, 4),
-        pytest.param(lambda job: with_resin(job, membrane_modulus_kPa=2000.0), 1, 4, marks=COSTS),
+        ({"times": 2, "protocol": Protocol(np.arange(2.0), np.array([0.0, 1.5]))}, 0, 1),
         # A wall that remembers has no beams.
-        pytest.param(lambda job: with_resin(job, law="prony", prony_g1=0.2), 2, 2, marks=COSTS),
-        (lambda job: with_wall(job, 1.0), 2, 4),
-        pytest.param(lambda job: attrs.evolve(job, mesh=MeshSettings(refine=0.5)), 2, 4, marks=COSTS),
+        pytest.param({"unit": JOB.unit.evolve(law="prony", prony_g1=0.2)}, 1, 0, marks=COSTS),
+        ({"unit": THICKER}, 1, 2),
     ],
-    ids=["nothing", "stations", "protocol", "resin", "memory", "wall", "mesh"],
+    ids=["protocol", "memory", "wall"],
 )
-def test_a_change_costs_only_what_depends_on_it(copied, change, mesh, states):
-    """So many entries of the cache afterwards, two states a motion; what was there is not written again."""
+def test_a_change_costs_only_what_depends_on_it(copied, change, meshes, states):
+    """So many further entries of the cache; what was there is not written again."""
     folder, _ = copied
     before = {kind: times(folder, kind) for kind in ("meshed", "states")}
-    job = attrs.evolve(change(JOB), stages=("design", "simulate"))
-    ran(job, folder)
-    for kind, count in (("meshed", mesh), ("states", states)):
+    ran(attrs.evolve(MOTION, **change), folder)
+    for kind, count in (("meshed", meshes), ("states", states)):
         after = times(folder, kind)
-        assert len(after) == count
+        assert len(after) == len(before[kind]) + count
         assert before[kind].items() <= after.items()
 
 
-@pytest.mark.parametrize("stages", [("design",), ("design", "simulate")])
-def test_a_smaller_job_keeps_what_is_still_valid(copied, stages):
+def test_a_smaller_job_keeps_what_is_still_valid(copied):
     folder, full = copied
     (folder / "report.html").write_text("of the full study")
-    study = attrs.evolve(JOB, stages=stages)
-    if stages == ("design",):
-        # What the smaller job was not asked is none of its business.
-        study = attrs.evolve(study, times=13, protocol=Protocol(np.arange(2.0), np.array([0.0, 40.0])))
-    summary = ran(study, folder)
-    for name, value in full.items():
-        if name not in ("seconds", "gates", "warnings"):
-            assert summary[name] == value, name
-    assert set(full["seconds"]) <= set(summary["seconds"])
-    assert set(full["gates"]) >= {"unit.stl"}
-    assert (folder / "deviation.csv").is_file()
-    assert not (folder / "stale").exists()
-    assert UnitStudy.read(folder).stages == JOB.stages
-    assert (folder / "report.html").read_text() == "of the full study"
+    before = {kind: times(folder, kind) for kind in ("meshed", "states")}
+    # What the smaller jobs were not asked is none of their business.
+    other = Protocol(np.arange(2.0), np.array([0.0, 40.0]))
+    for study in (attrs.evolve(JOB, stages=("design",), times=13, protocol=other), MOTION):
+        summary = ran(study, folder)
+        for name, value in full.items():
+            if name not in ("seconds", "gates", "warnings", "options"):
+                assert summary[name] == value, name
+        assert set(full["seconds"]) <= set(summary["seconds"])
+        assert set(full["gates"]) >= {"unit.stl"}
+        assert (folder / "deviation.csv").is_file()
+        assert not (folder / "stale").exists()
+        assert UnitStudy.read(folder).stages == JOB.stages
+        assert (folder / "report.html").read_text() == "of the full study"
+    assert {kind: times(folder, kind) for kind in before} == before
+
+
+def test_stopped_among_its_candidates_it_keeps_what_it_has(copied, monkeypatch):
+    """Pictures take most of a report's time, and somebody waits."""
+    folder, _ = copied
+    for path in (folder / "cache").glob("candidates-*"):
+        path.unlink()
+    whole = Results.made
+
+    def stopped(self, task, values):
+        if task[0] == "candidates":
+            raise KeyboardInterrupt
+        return whole(self, task, values)
+
+    monkeypatch.setattr(Results, "made", stopped)
+    context, _ = unit_runs.ended(attrs.evolve(JOB, workers=1), folder)
+    assert context.status == 130
+    summary = json.loads((folder / "summary.json").read_text())
+    assert summary["status"] == "partial"
+    assert "Ctrl-C" in summary["reason"]["what"]
+    report = (folder / "report.html").read_text()
+    assert "This run is partial" in report
+    assert "This report has no pictures" in report
+    assert "image/png" not in report
 
 
 def test_a_smaller_job_of_another_unit_sets_all_aside(copied):
     folder, _ = copied
-    summary = ran(attrs.evolve(with_wall(JOB, 1.0), stages=("design",)), folder)
+    summary = ran(attrs.evolve(JOB, unit=THICKER, stages=("design",)), folder)
     assert "chosen" not in summary
     assert not (folder / "deviation.csv").exists()
     assert (folder / "stale" / "deviation.csv").is_file()
@@ -193,13 +200,13 @@ def damaged(path, damage, rng):
 DAMAGES = ("truncated", "flipped", "emptied", "other names", "other shapes")
 
 
-def test_damaged_states_are_solved_again_to_the_same_digits(placed, copied):
+def test_damaged_states_are_solved_again_to_the_same_digits(finished, copied):
     folder, _ = copied
     rng, kept = np.random.default_rng(0), [*times(folder, "meshed"), *times(folder, "states")]
-    for number, name in enumerate(sorted(kept)):
-        damaged(folder / "cache" / name, DAMAGES[number], rng)
-    ran(attrs.evolve(JOB, stages=("design", "simulate")), folder)
-    assert (folder / "motion.csv").read_bytes() == (placed[0] / "motion.csv").read_bytes()
+    for name, damage in zip(sorted(kept), DAMAGES, strict=False):
+        damaged(folder / "cache" / name, damage, rng)
+    ran(MOTION, folder)
+    assert (folder / "motion.csv").read_bytes() == (finished / "motion.csv").read_bytes()
 
 
 def test_too_little_room_is_told_before_any_work(tmp_path, monkeypatch):
@@ -221,34 +228,20 @@ def test_room_is_asked_for_as_the_study_grows():
         assert 0.9 * nodes < expected < 1.1 * nodes
 
 
-def test_what_a_study_writes_is_less_than_the_room_it_asks_for(placed):
-    folder, summary = placed
-    written = sum(path.stat().st_size for path in folder.rglob("*") if path.is_file())
-    nodes, pressures = summary["mesh"]["nodes"], 3
-    asked = BYTES["interactive"] + nodes * BYTES_A_NODE["place"] * pressures
-    assert written < asked
-
-
-def of_thin_walls(**given):
+@pytest.mark.slow
+def test_a_study_says_where_walls_and_struts_touch(tmp_path):
     """Three chambers whose walls touch by -8.5 kPa."""
-    unit = load_preset("mu-1.0x")
-    return UnitStudy(
-        unit=attrs.evolve(unit, chambers=attrs.evolve(unit.chambers, count=3, wall_mm=0.5)),
+    thin = attrs.evolve(
+        MOTION,
+        unit=UNIT.evolve(count=3, wall_mm=0.5),
         protocol=Protocol(np.arange(3.0), np.array([0.0, -8.5, 0.0])),
         mesh=MeshSettings(refine=0.2),
         times=3,
-        stages=("design", "simulate"),
         self_contact=True,
-        workers=1,
-        **given,
     )
-
-
-@pytest.mark.slow
-def test_a_study_says_where_walls_and_struts_touch(tmp_path):
-    ran(of_thin_walls(), tmp_path)
-    rows = read_rows(tmp_path / "self_contact.csv")
-    by_pressure = {float(row["pressure_kPa"]): row for row in rows}
+    ran(thin, tmp_path)
+    with (tmp_path / "self_contact.csv").open(newline="", encoding="utf-8") as stream:
+        by_pressure = {float(row["pressure_kPa"]): row for row in csv.DictReader(stream)}
     assert sorted(by_pressure) == [-8.5, 0.0]
     assert float(by_pressure[-8.5]["force_N"]) > 0.01
     assert 0.0 < float(by_pressure[-8.5]["least_gap_mm"]) < 0.5 / 9
@@ -279,41 +272,10 @@ def test_friction_of_walls_that_cannot_slide_is_refused(changed, where):
     assert where in str(refused.value)
 
 
-@pytest.mark.nightly("test_a_study_says_where_walls_and_struts_touch")
-def test_walls_that_slide_dissipate_and_a_second_run_says_the_same(tmp_path):
-    job = of_thin_walls(self_friction=0.3)
-    ran(job, tmp_path)
-    assert UnitStudy.read(tmp_path).self_friction == 0.3
-    first = {name: (tmp_path / name).read_bytes() for name in ("motion.csv", "self_contact.csv")}
-    lost = json.loads((tmp_path / "summary.json").read_text())["self_friction"]["lost_mJ"]
-    assert lost > 0
-    ran(job, tmp_path)
-    assert first == {name: (tmp_path / name).read_bytes() for name in first}
-    assert json.loads((tmp_path / "summary.json").read_text())["self_friction"]["lost_mJ"] == lost
-
-
-@pytest.mark.nightly(
-    "tests/body/test_waveguide.py::test_a_candidate_is_found_from_model_a_s_state_as_along_its_own_path"
-)
-def test_a_printed_candidate_that_is_lost_is_solved_alone(tmp_path):
-    """Each printed waveguide is kept as soon as it is solved: a killed run loses no other's."""
-    unit = load_preset("mu-1.0x")
-    job = UnitStudy(
-        unit=attrs.evolve(unit, chambers=attrs.evolve(unit.chambers, count=4)),
-        protocol=Protocol(np.arange(2.0), np.array([0.0, 1.0])),
-        mesh=MeshSettings(refine=0.4),
-        times=2,
-        mesh_check=False,
-        workers=1,
-    )
-    found = ran(job, tmp_path)["J_hat_mm"]
-    kept = sorted((tmp_path / "cache").glob("candidates-*"))
-    assert len(kept) == len(found) == 3
-    kept[1].unlink()
-    before = {path.name: path.stat().st_mtime_ns for path in kept[::2]}
-    assert ran(job, tmp_path)["J_hat_mm"] == found
-    assert kept[1].exists()
-    assert {path.name: path.stat().st_mtime_ns for path in kept[::2]} == before
+def test_what_a_study_writes_is_less_than_the_room_it_asks_for(finished):
+    written = sum(path.stat().st_size for path in finished.rglob("*") if path.is_file())
+    nodes = json.loads((finished / "summary.json").read_text())["mesh"]["nodes"]
+    assert written < BYTES["interactive"] + nodes * BYTES_A_NODE["place"] * 3
 
 
 def test_a_lattice_that_holds_no_waveguide_is_refused_before_anything_is_made(tmp_path):

@@ -281,14 +281,3 @@ def test_a_missing_strut_is_a_missing_tunnel():
     assert found["tunnels"].severity == "error"
     assert ": 1 less, as if struts were missing" in found["tunnels"].what
     assert found["volume"].severity == "pass"
-
-
-@pytest.mark.nightly("test_a_sound_unit_has_none_of_them")
-def test_the_same_unit_of_other_facets_is_the_same():
-    solid, fine = parts.small_solid(), build_solid(parts.small_unit(), quality="export")
-    nominal = solid.vertices, solid.triangles
-    found = check(fine.vertices, fine.triangles, load_printer(), stages=(), nominal=nominal)
-    assert {f.check: f.severity for f in found.findings if f.check in ("tunnels", "volume")} == {
-        "tunnels": "pass",
-        "volume": "pass",
-    }
