@@ -203,6 +203,12 @@ def test_a_megabyte_without_an_end_is_thrown_away() -> None:
         assert sum(len(g) for g in groups) > 2000
 
 
+def test_a_line_longer_than_any_sensor_s_is_refused_unread() -> None:
+    decoder = Decoder()
+    fed(decoder, b"light:1\n" * 60 + b"light:" + b" " * 5000 + b"2\n", [64, 20_000])
+    assert (decoder.counters.malformed, decoder.counters.samples) == (1, 59)
+
+
 @given(st.lists(st.binary(max_size=400), max_size=20))
 @settings(max_examples=60)
 def test_no_bytes_crash_it(chunks: list[bytes]) -> None:

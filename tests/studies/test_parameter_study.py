@@ -10,6 +10,7 @@ import subprocess
 import sys
 import time
 from pathlib import Path
+from types import SimpleNamespace
 
 import attrs
 import numpy as np
@@ -165,6 +166,12 @@ def test_whatever_happens_to_a_study_becomes_a_row(how, limits, words):
     assert row.seconds > 0
     # Looked at every 50 ms, a study that takes 20 MB every 20 ms is some 60 MB over when it is stopped.
     assert row.memory_MB < limits.get("memory_MB", 1000) + 200
+
+
+def test_a_minute_has_sixty_seconds():
+    child = SimpleNamespace(seconds=61.0, progress={})
+    short, long = (point_module._too_much(child, task("hang", minutes=m), 0.0) for m in (1.0, 1.1))
+    assert (short["where"], long) == ("at its start", None)
 
 
 def test_a_study_that_is_done_is_a_row_with_its_summary():
