@@ -18,7 +18,7 @@ from ..fem.equilibrium import Equilibrium
 from ..fem.held_tip import HeldTip
 from ..fem.state import State
 from ..fem.trajectory import branches
-from ..fem.unit_materials import self_contact_of
+from ..fem.unit_materials_and_contact import self_contact_of
 from ..measured.pose import X
 from ..run.cache import Cache
 from .effects import ON_UNITS

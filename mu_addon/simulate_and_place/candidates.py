@@ -21,7 +21,7 @@ from ..generators import value_of
 from ..meshing.mesh import Mesh
 from ..placement.candidates import Candidate, Evaluation, evaluation
 from ..placement.deviation import centreline
-from ..placement.elimination import Contest, first_and_rest, lower_bounds
+from ..placement.deviation_bounds import Contest, first_and_rest, lower_bounds
 from ..placement.sampling import between, relative_error, solution_order
 from .mechanics import Mechanics, Samples
 

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 import attrs
 import numpy as np
 
-from ..placement.elimination import first_and_rest
+from ..placement.deviation_bounds import first_and_rest
 
 if TYPE_CHECKING:
     from ..studies.unit_motion import UnitMotion

@@ -15,7 +15,7 @@ from ..fem.bending_angle import TipSection
 from ..fem.kinematics import cavity_volume_mm3
 from ..fem.state import State
 from ..fem.stress import peak_stretch
-from ..fem.unit_materials import self_contact_of as contact_of
+from ..fem.unit_materials_and_contact import self_contact_of as contact_of
 from ..meshing.mesh import LATTICE, MEMBRANE, Mesh
 
 if TYPE_CHECKING:

@@ -20,7 +20,7 @@ from ..fem.trajectory import Trajectory, whole_body
 from ..generators import value_of
 from ..meshing.mesh import Mesh
 from ..placement.candidates import Candidate
-from ..placement.elimination import Contest
+from ..placement.deviation_bounds import Contest
 from ..placement.graph import Limits
 from ..placement.search import Search, searching
 from ..report.results import LatticePath, Signals

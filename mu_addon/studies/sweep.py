@@ -181,7 +181,7 @@ class Sweep(Study):
         again=lambda study, found: study.retry and found.status == "failed",
     )
     def points(self, task: parameter_study.Task) -> parameter_study.Outcome:
-        """The study of a point; one that breaks a rule has none."""
+        """The study of a point, submitted by `run.execution`; one that breaks a rule has none."""
         from .parameter_study import point
 
         if task is None:

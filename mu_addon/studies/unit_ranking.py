@@ -281,7 +281,7 @@ class UnitStudy(UnitMotion):
     @property
     def contest(self) -> Any:
         """The paths whose deviation is to be known exactly: the best one, or those of the mesh check."""
-        from ..placement.elimination import Contest
+        from ..placement.deviation_bounds import Contest
 
         return Contest(PATHS_CHECKED if self.mesh_check else 1, every=self.all_paths)
 

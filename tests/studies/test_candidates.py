@@ -10,7 +10,7 @@ from mu_addon.design.anchors import anchor_points
 from mu_addon.errors import ConvergenceError
 from mu_addon.placement.candidates import Evaluation
 from mu_addon.placement.deviation import deviation_of
-from mu_addon.placement.elimination import Contest
+from mu_addon.placement.deviation_bounds import Contest
 from mu_addon.simulate_and_place import candidates
 from mu_addon.simulate_and_place.candidates import (
     Comparison,

@@ -13,7 +13,7 @@ from mu_addon.fem.protocol import Protocol
 from mu_addon.meshing.settings import MeshSettings
 from mu_addon.placement.candidates import Evaluation
 from mu_addon.placement.deviation import deviation_of
-from mu_addon.placement.elimination import Contest
+from mu_addon.placement.deviation_bounds import Contest
 from mu_addon.run.parts import Sentence
 from mu_addon.simulate_and_place.motion_checks import doubts_of_protocol
 from mu_addon.simulate_and_place.ranking import Ranking

@@ -1,4 +1,4 @@
-"""Viscoelasticity."""
+"""Viscoelasticity: relaxation at a held stretch, creep at a held load or pressure."""
 
 import attrs
 import numpy as np

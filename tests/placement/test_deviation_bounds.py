@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from mu_addon.placement.deviation import deviation_of
-from mu_addon.placement.elimination import Contest, first_and_rest, lower_bounds
+from mu_addon.placement.deviation_bounds import Contest, first_and_rest, lower_bounds
 
 PRESSURES = np.array([-20.0, -10.0, 10.0, 20.0, 30.0, 40.0])
 
