@@ -1,8 +1,8 @@
 """The runs of one unit: every study of it, each in a separate folder.
 
 A unit has a home folder. Its runs are in `runs/` there, each named by the hash of its inputs: the same inputs
-find the same folder, and other inputs never change it. A study in the home folder itself, and its predecessor
-in `stale/`, are of an older version and are listed with the others. A run's name and star are in its folder's
+find the same folder, and other inputs never change it. A study in the home folder itself, as a command
+writes it, and its predecessor in `stale/` are listed with the others. A run's name and star are in its folder's
 `label.toml`.
 """
 
@@ -42,7 +42,7 @@ BODY, OBSTACLES = "body.obj", "obstacles.obj"
 
 RUNS, LABEL = "runs", "label.toml"
 HOME, STALE = "home", "stale"
-"""Keys of the runs of older versions: in the home folder itself, and the one set aside by its next."""
+"""Keys of the runs of a command: in the home folder itself, and the one set aside by its next."""
 SUMMARY, OUTPUTS = "summary.json", "blender"
 """File of a run's results, and of the output of a process that Blender started."""
 EFFECTS = ("orientation_deg", "effects")
