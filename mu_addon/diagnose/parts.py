@@ -11,7 +11,7 @@ import numpy as np
 
 from ..evidence.effect import Parameter, bare, readable
 from ..evidence.fit import Fit
-from ..evidence.found_causes import RIVAL_DELTA_CHI2
+from ..evidence.found_causes import BEYOND, RIVAL_DELTA_CHI2
 from ..evidence.record import KNOWN, repeats
 from ..evidence.residuals import CONDITIONS, COVARIATES, FALSE_ALARM
 from ..evidence.scatter import noise_limit
@@ -229,6 +229,8 @@ def _against(found: JudgedData, f: Fit, rivals: set[str]) -> str:
         return f"none: a rival that these data do not distinguish{bound}"
     if e.title in rivals:
         return f"by this law it leaves {more:.3g} more; by another one it is not distinguished{bound}"
+    if e.title + BEYOND in rivals:
+        return f"none but its bound{bound}"
     if gained < RIVAL_DELTA_CHI2:
         return f"no significant gain ({_figures(max(gained, 0.0))}){bound}"
     if not selection.chosen.effects:

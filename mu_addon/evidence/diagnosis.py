@@ -29,7 +29,7 @@ from .plausibility import require_plausible
 from .readings import without_unpredicted_readings, without_wrong_readings
 from .record import Record, record
 from .residuals import ALTERNATION, BY_TURN, strict_table, structure
-from .rivals import coinciding, with_promising_rivals
+from .rivals import beyond_bounds, coinciding, with_promising_rivals
 from .scatter import (
     NEAR,
     with_bursts,
@@ -39,6 +39,7 @@ from .scatter import (
 )
 from .search import further_owners, of_some_tests, one_more, reselected, select, select_owned, select_pooled
 from .sensitivity import (
+    ABSORBED,
     WANDERING,
     Sensitivity,
     sensitivities,
@@ -249,6 +250,13 @@ def by_size(now: Diagnosis, progress: Progress) -> Diagnosis:
     return now
 
 
+def without_bounds(now: Diagnosis, progress: Progress) -> Diagnosis:
+    """Give causes without rivals those that only a bound of their own excludes."""
+    if now.kind == "named":
+        now = attrs.evolve(now, chosen=beyond_bounds(now.fitter, now.chosen, now.seen, progress))
+    return now
+
+
 STEPS = (
     under_quieter_noise,
     without_lone_readings,
@@ -258,6 +266,7 @@ STEPS = (
     with_what_explains_most,
     under_bursts,
     by_size,
+    without_bounds,
 )
 
 
@@ -360,9 +369,16 @@ def _rough(measured: Record, group: str) -> Source:
 
 
 def _seen(fitter: Fitter, base: Fit) -> list[Sensitivity]:
-    """Sensitivity to each effect of the library at the base model's values."""
+    """Sensitivity to each effect of the library at the base model's values.
+
+    Also to laws with more freedom of an effect whose first law shows nothing: where a modulus takes up a
+    frame that gives in proportion, it leaves one that settles.
+    """
     curved = {p.name: base.values[p.name] for p in fitter.curved}
-    return at_bounds(fitter, curved, sensitivities(fitter, curved))
+    seen = at_bounds(fitter, curved, sensitivities(fitter, curved))
+    shown = {s.effect.name for s in seen if s.unabsorbed > ABSORBED}
+    alone = [law for law in fitter.simulator.refinements if law.name not in shown]
+    return [*seen, *at_bounds(fitter, curved, sensitivities(fitter, curved, alone))]
 
 
 def _noise_around(now: Diagnosis) -> dict[str, Source]:

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable
+
 import attrs
 
 from .effect import Effect
@@ -19,6 +21,8 @@ LAW = 0.05
 UNKNOWN = 0.1
 # Between the titles of two effects that are one rival together.
 TOGETHER = " with "
+# At the end of a rival's title that a bound of its own alone excludes.
+BEYOND = " beyond its bound"
 
 
 def not_distinguished(chi2: float, values: int) -> float:
@@ -29,13 +33,18 @@ def not_distinguished(chi2: float, values: int) -> float:
     return max(RIVAL_DELTA_CHI2, UNKNOWN * (chi2 - values))
 
 
+def effects_in(titles: Iterable[str]) -> tuple[str, ...]:
+    """Names of the effects in rivals' titles, each once."""
+    return tuple(dict.fromkeys(t.partition(" ")[0] for title in titles for t in title.split(TOGETHER)))
+
+
 @attrs.frozen(eq=False)
 class Cause:
     """One effect of the chosen model.
 
     p_value: probability that by noise alone any effect of the library gains as much. loss: rise of chi
     squared when the effect is removed and the rest fitted again. rivals: titles of effects whose fit in its
-    place is indistinguishable, best first.
+    place is indistinguishable, best first; with `BEYOND` where that is so with another bound.
     """
 
     effect: Effect

@@ -10,10 +10,10 @@ import numpy as np
 
 from ..errors import MuError
 from ..measured import Experiment
-from .effect import BATCH, GEOMETRY, OF, THICKNESS
+from .effect import BATCH, GEOMETRY, THICKNESS
 from .effects import DECLARED
 from .fit import Fit, Fitter
-from .found_causes import Selection
+from .found_causes import Selection, effects_in
 from .noise import Whitening
 from .record import record
 from .sensitivity import Sensitivity
@@ -64,16 +64,14 @@ def propose_experiment(fitter: Fitter, found: Selection, seen: Sequence[Sensitiv
             best = Proposal(f"{e.name}; or {cause.effect.reveals}", names, expected)
     if best is None or best.expected < 1.0:
         own = {s.effect.name: s.effect.reveals for s in seen}
-        plain = dict.fromkeys(n.partition(OF)[0].partition(" among ")[0] for n in names)
+        plain = effects_in(names)
         # Another specimen separates a scale of one specimen from any other cause; of struts drawn unlike, it
         # would be as far off.
         drawn = {e.strut_mm for e in fitter.record.experiments}
         specimens = BATCH, GEOMETRY
         tied = [n for n in ((THICKNESS, *specimens) if len(drawn) > 1 else specimens) if n in plain]
-        asked = tied[:1] or list(plain)
-        words = "; or ".join(
-            dict.fromkeys(own.get(n, DECLARED[n].reveals if n in DECLARED else n) for n in asked)
-        )
+        asked = tied[:1] or plain
+        words = "; or ".join(dict.fromkeys(own.get(n, DECLARED[n].reveals) for n in asked))
         return Proposal(words, names, best.expected if best else 0.0)
     return best
 

@@ -11,6 +11,8 @@ from ..errors import InputError
 EVERY = (-math.inf, math.inf)
 # Between a parameter's key and the specimen or experiment that its effect belongs to.
 OF = " of "
+# Times as far from the null a bound is set to see whether it alone excludes an effect; the largest share.
+FARTHER, MOST = 3.0, 0.99
 
 
 @attrs.frozen
@@ -57,6 +59,18 @@ class Parameter:
         if self.starts and not starts:
             starts = (0.5 * (low + high),)
         return attrs.evolve(self, low=low, high=high, starts=starts)
+
+    def farther(self, bound: float) -> float:
+        """A bound `FARTHER` times as far from the null, in its unit, where the parameter still has a meaning.
+
+        What is positive stays so, and a share stays below 1.
+        """
+        if bound * self.null > 0.0:
+            far = bound * FARTHER if bound > self.null else bound / FARTHER
+        else:
+            far = self.null + FARTHER * (bound - self.null) if bound else 0.0
+        most = math.inf if self.unit or abs(bound) >= 1.0 else max(MOST, abs(bound))
+        return min(max(far, -most), most)
 
     @property
     def step(self) -> float:

@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Container
+from collections.abc import Container, Mapping
 
+import attrs
 import numpy as np
 
 from ..errors import InputError
-from .effect import Parameter
+from .effect import Effect, Parameter
+from .effects import DECLARED, laws_of
 from .fit import Fit, Fitter, logarithmic
 from .found_causes import RIVAL_DELTA_CHI2
 
@@ -113,12 +115,35 @@ def at_a_bound(fit: Fit) -> bool:
 
 def value_at_a_bound(p: Parameter, value: float) -> bool:
     """Return True if a value lies at a bound of its parameter that is not its null, or is implausible."""
-    if not p.plausible[0] <= value <= p.plausible[1]:
-        # An implausible value is no cause, though a fit may reach it.
-        return True
+    # An implausible value is no cause, though a fit may reach it.
+    return not p.plausible[0] <= value <= p.plausible[1] or bool(_reached(p, value))
+
+
+def _reached(p: Parameter, value: float) -> list[float]:
+    """Bounds of a parameter, other than its null, that a value lies at."""
     ends = [b for b in (p.low, p.high) if b != p.null]
     if logarithmic(p):
         # Over decades the range's own size is near the low end's neighbours, too.
         near = 1e-3 * math.log(p.high / p.low)
-        return any(abs(math.log(value / b)) < near for b in ends)
-    return any(abs(value - b) < 1e-3 * (p.high - p.low) for b in ends)
+        return [b for b in ends if abs(math.log(value / b)) < near]
+    return [b for b in ends if abs(value - b) < 1e-3 * (p.high - p.low)]
+
+
+def widened(effect: Effect, values: Mapping[str, float]) -> Effect | None:
+    """An effect with the bounds farther away that its values, by key, lie at; None if they lie at none.
+
+    Its fits start from these values. A bound by the data stays: that of adiabatic compression, or of sizes
+    that were simulated.
+    """
+    declared = [p for kind in effect.kinds for w in laws_of(kind).get(effect.name, ()) for p in w.parameters]
+    if unit := DECLARED[effect.name].unit:
+        declared.append(unit.parameter)
+    known = {(p.name, bound) for p in declared for bound in (p.low, p.high)}
+    found = []
+    for key, p in zip(effect.keys, effect.parameters, strict=True):
+        value = values.get(key, p.null)
+        away = {b: p.farther(b) for b in _reached(p, value) if (p.name, b) in known}
+        low, high = away.get(p.low, p.low), away.get(p.high, p.high)
+        found.append(attrs.evolve(p, low=low, high=high, starts=(value,)))
+    same = all((a.low, a.high) == (b.low, b.high) for a, b in zip(found, effect.parameters, strict=True))
+    return None if same else attrs.evolve(effect, parameters=tuple(found))

@@ -12,7 +12,15 @@ from .effect import CURVED_CELL, FORCE_SCALE, Effect
 from .effects import CAMERA, GRIPS
 from .effects.declaration import MACHINE
 from .fit import Fit, Fitter
-from .found_causes import LAW, RIVAL_DELTA_CHI2, TOGETHER, Cause, Selection, not_distinguished
+from .found_causes import (
+    BEYOND,
+    LAW,
+    RIVAL_DELTA_CHI2,
+    TOGETHER,
+    Cause,
+    Selection,
+    not_distinguished,
+)
 from .hypotheses import (
     HALF_WAY,
     SEEDS,
@@ -25,9 +33,9 @@ from .hypotheses import (
     refined,
 )
 from .owned import owned_effects
-from .plausibility import at_a_bound
+from .plausibility import at_a_bound, widened
 from .residuals import strict_table
-from .sensitivity import Sensitivity
+from .sensitivity import ABSORBED, Sensitivity
 
 # Number of a cause's rivals that are fitted by all laws of their mechanisms, and the share of the cause's
 # gain that they need by their first law.
@@ -138,6 +146,33 @@ def coinciding(
             c = Cause(found.chosen.effects[-1], c.p_value, c.loss, (c.effect.title, *c.rivals))
         rivals = dict.fromkeys((*c.rivals, *(f.effects[-1].title for f in near)))
         causes.append(attrs.evolve(c, rivals=tuple(rivals)))
+    return attrs.evolve(found, causes=tuple(causes))
+
+
+def beyond_bounds(
+    fitter: Fitter,
+    found: Selection,
+    seen: Sequence[Sensitivity],
+    progress: Callable[[str], None] = lambda _: None,
+) -> Selection:
+    """The selection of causes without rivals, with those that a bound of their own alone excludes.
+
+    A bound is prior knowledge, no reason why a name has no rival. An effect whose fit ends at one, or that is
+    too small within it to be seen, is fitted in place of each cause with that bound farther away
+    (`plausibility.widened`).
+    """
+    ended = [(f.effects[0], f.values) for f in (*found.singles, *found.wider) if len(f.effects) == 1]
+    for s in seen:
+        size, key = s.effect.parameters[0], s.effect.keys[0]
+        if s.unabsorbed > ABSORBED and not s.worth_a_fit:
+            ended += [(s.effect, {**s.shape, key: end}) for end in {size.low, size.high} - {size.null}]
+    chosen, causes = found.chosen, []
+    others = [(e, values) for e, values in ended if not e.among and e.name not in chosen.names]
+    wider = [w for e, values in others if (w := widened(e, values))]
+    for c in found.causes:
+        fits = promising_rivals(fitter, chosen, c.effect, wider, progress)
+        apart = ((f.effects[-1].title + BEYOND, cost(f) - cost(chosen)) for f in fits)
+        causes.append(attrs.evolve(c, rivals=tuple(nearest(apart, margin(fitter, found)))))
     return attrs.evolve(found, causes=tuple(causes))
 
 

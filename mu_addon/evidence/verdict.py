@@ -11,10 +11,10 @@ import attrs
 import numpy as np
 
 from ..measured import Experiment
-from .effect import OF, Effect, Parameter
+from .effect import Effect, Parameter
 from .fit import Fit, Fitter
 from .fitted_zeros import FittedZeros
-from .found_causes import TOGETHER, Cause, Selection
+from .found_causes import BEYOND, TOGETHER, Cause, Selection, effects_in
 from .gain_on_unseen import Gain
 from .hypotheses import ranked
 from .main_causes import share_taken
@@ -76,8 +76,8 @@ class Verdict:
         """Names of the effects named and their rivals; empty unless the verdict is `named` or `ambiguous`."""
         if self.kind not in ("named", "ambiguous"):
             return frozenset()
-        rivals = {r for c in self.selection.causes for title in c.rivals for r in title.split(TOGETHER)}
-        return frozenset(self.names) | rivals
+        titles = (title.removesuffix(BEYOND) for c in self.selection.causes for title in c.rivals)
+        return frozenset(self.names).union(*(title.split(TOGETHER) for title in titles))
 
     @property
     def in_question(self) -> frozenset[str]:
@@ -94,8 +94,7 @@ class Verdict:
         names |= {
             f.names[0] for f, gain in taken if gain > NEAR * most or (gain > SOME * most and at_a_bound(f))
         }
-        titles = [t for c in found.causes for title in c.rivals for t in title.split(TOGETHER)]
-        return frozenset(names | {t.split(OF)[0] for t in titles})
+        return frozenset(names.union(*(effects_in(c.rivals) for c in found.causes)))
 
     def _share(self, cause: Cause) -> float:
         """Share of the base model's misfit that returns where one of several causes is taken away."""

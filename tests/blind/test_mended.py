@@ -1,5 +1,6 @@
 """Data by closed forms of their own on which a verdict was wrong, or said less than it should."""
 
+import attrs
 import numpy as np
 import pytest
 
@@ -72,3 +73,18 @@ def test_a_unit_that_softens_by_another_law_is_softened_and_nothing_beside_it():
     found = diagnose(made, analytic.simulator(made))
     assert (found.kind, found.names) == ("named", ("mullins_softening",))
     assert found.selection.chosen.values["mullins_softening.lost"] == pytest.approx(0.3, abs=0.02)
+
+
+@pytest.mark.parametrize(
+    "settled", [np.tanh, lambda x: 1.25 - 1.25 * (1.0 + 0.5 * x) ** -1.5, lambda x: 1.0 - np.exp(-x)]
+)
+def test_grips_that_settle_on_linear_blocks_are_at_least_a_rival_of_stiffening(settled):
+    """In proportion a frame is another modulus: the law that settles was not tried, and stiffening named."""
+    made = blocks([1.0] * 4, lambda e: 45.0 * e, noise=0.02)
+    for i, e in enumerate(made):
+        read = e["strain"] + 0.4 * settled(np.abs(e["stress_kPa"]) / 2.0) / 32.0
+        how = {"length_mm": 32.0, "section_mm": (32.0, 32.0), "specimen": "A"}
+        made[i] = attrs.evolve(e, columns={**e.columns, "strain": read}, **how)
+    found = judged(made)
+    assert "frame_compliance" in found.ambiguity
+    assert "strain_stiffening" not in found.names

@@ -7,6 +7,7 @@ from mu_addon.diagnose.words import advice, sentence, to_do
 from mu_addon.evidence.diagnosis import diagnose
 from mu_addon.evidence.drive import denoised_drives
 from mu_addon.evidence.found_causes import RIVAL_DELTA_CHI2, not_distinguished
+from mu_addon.evidence.parameter import Parameter
 from mu_addon.evidence.prediction import coupon
 from mu_addon.evidence.prediction.bench import bench_simulators
 from mu_addon.evidence.simulator import Composite
@@ -160,3 +161,33 @@ def test_two_causes_of_which_one_alternates_by_test_are_both_found():
 def test_margins_grow_with_what_no_law_explains():
     assert not_distinguished(980.0, 982) == RIVAL_DELTA_CHI2
     assert not_distinguished(1450.0, 982) > 33.0
+
+
+def test_a_rival_that_only_its_bound_excludes_keeps_the_verdict_open():
+    """Warm tests are softer by an eighth a kelvin, where a resin is believed to lose a twentieth at most."""
+
+    def found(warm_C):
+        warm = {2: {"temperature_C": warm_C, "times": 0.75}, 3: {"temperature_C": warm_C, "times": 0.75}}
+        return judged([pulled(f"test {i}", specimen="A", **warm.get(i, {})) for i in range(4)])
+
+    near = found(25.0)
+    assert near.kind == "ambiguous"
+    assert "temperature_drift beyond its bound" in titles(near)
+    assert "temperature drift beyond its bound" in " ".join(sentence(near))
+    assert "temperature_drift" in near.ambiguity
+    # Half of the modulus a kelvin is no resin's at all.
+    assert "temperature_drift beyond its bound" not in titles(found(23.5))
+
+
+@pytest.mark.parametrize(
+    ("parameter", "low", "high"),
+    [
+        (Parameter("kPa", "kPa", -2.0, 4.0, 1.0), -8.0, 12.0),
+        (Parameter("time_s", "s", 0.02, 1e3, 1.0), 0.02 / 3.0, 3e3),
+        (Parameter("share", "", 0.0, 0.6, 0.0), 0.0, 0.99),
+        (Parameter("damping", "", 0.005, 0.999, 0.1), 0.005 / 3.0, 0.999),
+        (Parameter("excess", "", -0.9, 9.0, 0.0), -0.99, 27.0),
+    ],
+)
+def test_a_parameter_keeps_its_meaning_beyond_its_bounds(parameter, low, high):
+    assert (parameter.farther(parameter.low), parameter.farther(parameter.high)) == pytest.approx((low, high))
