@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 import warnings
 from collections.abc import Callable, Collection, Iterator, Sequence
-from functools import partial
+from functools import cached_property, partial
 from pathlib import Path
 from typing import Any
 
@@ -62,6 +62,9 @@ OF_HELD = tuple(name for name, e in ON_UNITS.items() if e.of == HELD)
 # A second code with another mesh and another volumetric law, the same unit: its angles are ours at pressures
 # changed by 0.047 of the largest one times the square of their share of it.
 DISCREPANCY = 0.04
+
+
+Shown = Callable[[Result], Array]
 
 
 class UnitResponseWarning(UserWarning):
@@ -174,33 +177,33 @@ def unit_responses(
     """
     settings = settings or UnitSettings()
     if held:
-        names = tuple(n for n in settings.effects if n != CONTACT)
-        settings = attrs.evolve(settings, effects=names)
+        settings = attrs.evolve(settings, effects=tuple(n for n in settings.effects if n != CONTACT))
     chosen = [e for e in experiments if e.kind in ((blocked_force.KIND,) if held else FREE)]
     report = progress or (lambda stage, share: None)
     for e in chosen:
         if e.added_mass_g:
             raise InputError("the model of the unit has no added mass", e.name, "leave the experiment out")
     setups = sorted({(e.scale, _gap(e)) for e in chosen}, key=repr)
-    plans = [_Plan.of(unit, chosen, *setup, settings, cache) for setup in setups]
+    found: dict[str, Result] = {}
+    plans = [_Plan.of(unit, chosen, *setup, settings, cache, found) for setup in setups]
     for plan in plans:
         for m in plan.markers:
             report(f"marker {m.number} at {plan.scale:g}x lies {m.distance_mm:.2f} mm from its point", 0.0)
     # What runs of effects start from comes before all of them: the same digits on any number of cores.
     starts = {plan.case().key(): plan.case() for plan in plans}
-    cases = starts | {case.key(): case for plan in plans for case in plan.runs(settings)}
-    with_contact = CONTACT in settings.effects
-    part = 1 - CONTACT_SHARE if with_contact else 1.0
-    found = _found(
-        cases, settings.workers, cache, lambda what, share: report(what, share * part), len(starts)
-    )
-    if with_contact:
-        walls = {c.key(): c for plan in plans for _, _, c in plan.walls(found)}
-        more = _found(
-            walls, settings.workers, cache, lambda what, share: report(what, 1 + CONTACT_SHARE * (share - 1))
-        )
-        found |= more
-    responses = _counted_alike([r for plan in plans for r in plan.responses(settings, found)])
+    cases = starts | {case.key(): case for plan in plans for case in plan.runs()}
+    of_walls = CONTACT_SHARE if CONTACT in settings.effects else 0.0
+
+    def solve(cases: dict[str, Run], begin: float, part: float, alone: int = 0) -> None:
+        def of_all(what: str, share: float) -> None:
+            report(what, begin + part * share)
+
+        _solve(found, cases, settings.workers, cache, of_all, alone)
+
+    solve(cases, 0.0, 1.0 - of_walls, len(starts))
+    if of_walls:
+        solve({c.key(): c for plan in plans for _, _, c in plan.walls()}, 1.0 - of_walls, of_walls)
+    responses = _counted_alike([r for plan in plans for r in plan.responses()])
     # A request for the channels of all uses the first.
     return tuple(sorted(responses, key=lambda r: -len(r.channels)))
 
@@ -211,28 +214,25 @@ def _gap(e: Experiment) -> float | None:
 
 def _orientations(experiments: Sequence[Experiment]) -> tuple[tuple[float, Direction], ...]:
     """Orientations to simulate, in degrees about an axis, each once."""
-    found: dict[tuple[float, Direction], None] = {}
+    found: set[tuple[float, Direction]] = set()
     for e in experiments:
         at = unit_pose.STATIONS if e.kind == unit_pose.KIND else (e.orientation_deg,)
-        found |= dict.fromkeys((deg % 360.0, e.orientation_axis) for deg in at)
+        found |= {(deg % 360.0, e.orientation_axis) for deg in at}
     return tuple(sorted(found))
 
 
 def _counted_alike(responses: Sequence[UnitResponse]) -> list[UnitResponse]:
     """The responses with a wall's reach counted from the farthest motion of the free unit in any of them."""
-    farthest = {
-        s: max(r.walls[s].farthest_mm for r in responses if s in r.walls)
-        for s in {s for r in responses for s in r.walls}
-    }
-    return [
-        attrs.evolve(
-            r,
-            walls={
-                s: attrs.evolve(side, spare_mm=farthest[s] - side.farthest_mm) for s, side in r.walls.items()
-            },
-        )
-        for r in responses
-    ]
+    farthest: dict[int, float] = {}
+    for r in responses:
+        for s, side in r.walls.items():
+            farthest[s] = max(farthest.get(s, 0.0), side.farthest_mm)
+
+    def counted(r: UnitResponse) -> dict[int, ObstacleResponse]:
+        spare = {s: farthest[s] - side.farthest_mm for s, side in r.walls.items()}
+        return {s: attrs.evolve(side, spare_mm=spare[s]) for s, side in r.walls.items()}
+
+    return [attrs.evolve(r, walls=counted(r)) for r in responses]
 
 
 def similar(unit: Unit) -> Unit:
@@ -243,14 +243,9 @@ def similar(unit: Unit) -> Unit:
     divided by its scale.
     """
     p, s = unit.print, unit.scale
+    lengths = {"offset_xy_mm": p.offset_xy_mm, "offset_z_mm": p.offset_z_mm, "skin_depth_mm": p.skin_depth_mm}
     try:
-        less = attrs.evolve(
-            p,
-            offset_xy_mm=p.offset_xy_mm / s,
-            offset_z_mm=p.offset_z_mm / s,
-            skin_depth_mm=p.skin_depth_mm / s,
-        )
-        return attrs.evolve(unit, scale=1.0, print=less)
+        return unit.evolve(scale=1.0, **{name: length / s for name, length in lengths.items()})
     except InputError:
         return unit
 
@@ -259,21 +254,19 @@ def similar(unit: Unit) -> Unit:
 class _Plan:
     """Runs for one scale: `body`, similar to the unit, which is `enlarged` times as large.
 
-    changes: the mesh of effects, walls and designs. whole: effects at every size (`UnitSettings`).
-    readings_kPa: the least and the greatest.
+    readings_kPa: the least and the greatest. measured: columns with readings. found: results by key of runs.
     """
 
     body: Body
-    changes: MeshSettings
-    whole: frozenset[str] | None
+    settings: UnitSettings
     scale: float
     enlarged: float
     orientations: tuple[tuple[float, Direction], ...]
     pressures_kPa: tuple[float, ...]
     readings_kPa: tuple[float, float]
     markers: tuple[Marker, ...]
-    channels: tuple[str, ...]
-    designs: Designs | None = None
+    measured: frozenset[str]
+    found: dict[str, Result] = attrs.field(factory=dict)
 
     @classmethod
     def of(
@@ -284,6 +277,7 @@ class _Plan:
         gap_mm: float | None,
         settings: UnitSettings,
         cache: Path | None,
+        found: dict[str, Result],
     ) -> _Plan:
         here = [e for e in chosen if (e.scale, _gap(e)) == (scale, gap_mm)]
         scaled = attrs.evolve(unit, scale=scale)
@@ -291,30 +285,18 @@ class _Plan:
         mesh = mesh_printed(scaled, settings.mesh, cache=cache)
         reduced = similar(scaled)
         enlarged = scale / reduced.scale
-        gap = None if gap_mm is None else gap_mm / enlarged
-        body = Body(
-            reduced,
-            settings.mesh,
-            settings.distal,
-            gap_mm=gap,
-            self_contact=settings.self_contact,
-        )
-        markers = attached(mesh, here, settings.farthest_mm * scale)
-        measured = {c for e in here for c, values in e.columns.items() if np.isfinite(values).any()}
-        known = [ANGLE, VOLUME, *(f"marker{m.number}_{a}_mm" for m in markers for a in AXES)]
-        known = known if gap is None else [FORCE]
+        gap, touching = None if gap_mm is None else gap_mm / enlarged, settings.self_contact
         return cls(
-            body,
-            settings.changes,
-            settings.whole,
+            Body(reduced, settings.mesh, settings.distal, gap_mm=gap, self_contact=touching),
+            settings,
             scale,
             enlarged,
             _orientations(here),
             pressures(readings, settings.pressures, settings.margin),
             (float(readings.min()), float(readings.max())),
-            markers,
-            tuple(c for c in known if c in measured),
-            None if gap is not None else settings.designs,
+            attached(mesh, here, settings.farthest_mm * scale),
+            frozenset(c for e in here for c, values in e.columns.items() if np.isfinite(values).any()),
+            found,
         )
 
     @property
@@ -322,9 +304,16 @@ class _Plan:
         """True if a load cell holds the tip."""
         return self.body.gap_mm is not None
 
-    def names(self, settings: UnitSettings) -> list[str]:
+    @property
+    def rows(self) -> tuple[str, ...]:
+        """Channels of a result's rows, those of the outline apart."""
+        places = (f"marker{m.number}_{a}_mm" for m in self.markers for a in AXES)
+        return (FORCE,) if self.held else (ANGLE, VOLUME, *places)
+
+    @property
+    def names(self) -> list[str]:
         """Effects that have runs, walls apart."""
-        own = [n for n in settings.effects if ON_UNITS[n].of != WALL]
+        own = [n for n in self.settings.effects if ON_UNITS[n].of != WALL]
         return [*own, *(OF_HELD if self.held else ())]
 
     def case(
@@ -336,7 +325,8 @@ class _Plan:
         """
         points = tuple(tuple((m.point / self.enlarged).tolist()) for m in self.markers)
         turn, axis = orientation
-        body = attrs.evolve(self.body, mesh=self.changes, orientation_deg=turn, orientation_axis=axis)
+        mesh = self.settings.changes
+        body = attrs.evolve(self.body, mesh=mesh, orientation_deg=turn, orientation_axis=axis)
         outline = not effect and not self.held
         return Run(body, self.pressures_kPa, points, effect, size, outline)
 
@@ -345,75 +335,74 @@ class _Plan:
         """The run of the base model."""
         return attrs.evolve(self.case(), body=self.body)
 
-    def of_designs(self) -> list[Run]:
+    def of_designs(self, designs: Designs) -> list[Run]:
         """A run of every design, on the mesh of changes, at this scale."""
         case, cases = self.case(), []
-        for unit in self.designs.units if self.designs else ():
+        for unit in designs.units:
             drawn = similar(attrs.evolve(unit, scale=self.scale))
             other = attrs.evolve(case, body=attrs.evolve(case.body, unit=drawn), outline=False)
             cases.append(case if drawn == case.body.unit else other)
         return cases
 
-    def surface(self, found: dict[str, Result], kept: Any) -> Surface | None:
+    def surface(self, shown: Shown) -> Surface | None:
         """The response over the designs; those that do not reach a pressure are left out with a warning."""
-        if self.designs is None:
+        designs = self.settings.designs
+        if designs is None:
             return None
-        base, reference = self.base(found), self.reference(found)
         at, values = [], []
-        for place, case in zip(self.designs.at, self.of_designs(), strict=True):
-            result = self._unit(found[case.key()])
-            changed = self._taken_over(result, base, reference)
-            if np.isfinite(changed.values[kept]).all():
-                at.append(place)
-                values.append((self.larger * changed.values)[kept])
-            else:
-                shape = ", ".join(
-                    f"{p.name} {v:g}" for p, v in zip(self.designs.parameters, place, strict=True)
-                )
+        for place, case in zip(designs.at, self.of_designs(designs), strict=True):
+            result = self.result(case)
+            response = shown(self._taken_over(result))
+            if np.isnan(response).any():
+                pairs = zip(designs.parameters, place, strict=True)
+                shape = ", ".join(f"{p.name} {v:g}" for p, v in pairs)
                 _warn(f"{shape} at {self.scale:g}x is left out: {result.why}")
-        require_enough(len(at), len(self.designs.parameters))
-        return Surface(self.designs.parameters, np.array(at), np.array(values))
+            else:
+                at.append(place)
+                values.append(response)
+        require_enough(len(at), len(designs.parameters))
+        return Surface(designs.parameters, np.array(at), np.array(values))
 
-    def runs(self, settings: UnitSettings) -> Iterator[Run]:
+    def runs(self) -> Iterator[Run]:
         """First the runs that runs of effects start from, then the longest."""
         yield self.case()
         yield self.base_case
-        yield from self.of_designs()
-        for name in sorted(set(self.names(settings))):
+        if self.settings.designs:
+            yield from self.of_designs(self.settings.designs)
+        for name in sorted(set(self.names)):
             effect = ON_UNITS[name]
             for orientation in self.orientations if effect.has_gravity else ((0.0, X),):
                 for size in self.sizes(name):
                     if size != effect.parameter.null:
                         yield self.case(name, size, orientation)
 
+    def whole(self, name: str) -> bool:
+        """True if an effect is run at every size."""
+        return self.settings.whole is None or name in self.settings.whole
+
     def sizes(self, name: str) -> tuple[float, ...]:
         """Sizes of an effect that are run, its null among them."""
         effect = ON_UNITS[name]
-        if self.whole is None or name in self.whole:
-            return effect.sizes_at(self.enlarged)
-        return effect.first_at(self.enlarged)
+        return (effect.sizes_at if self.whole(name) else effect.first_at)(self.enlarged)
 
-    @property
-    def reaches(self) -> tuple[float, ...]:
-        """Walls that are run, as shares of how far the free unit gets."""
-        return REACHES if self.whole is None or CONTACT in self.whole else FIRST_REACHES
+    def result(self, case: Run) -> Result:
+        """What was found by a run, without the unit's outline."""
+        found = self.found[case.key()]
+        return Result(found.values[: len(self.rows)], found.why)
 
-    def base(self, found: dict[str, Result]) -> Result:
-        """The free unit's angle, volume and places, or the force of a held one."""
-        return self._unit(found[self.base_case.key()])
+    @cached_property
+    def base(self) -> Result:
+        """What the base model gives."""
+        return self.result(self.base_case)
 
-    def reference(self, found: dict[str, Result]) -> Result:
-        """Changes by effects on their mesh, as `base`."""
-        return self._unit(found[self.case().key()])
+    @cached_property
+    def coarse(self) -> Result:
+        """That on the mesh of changes."""
+        return self.result(self.case())
 
-    def _unit(self, result: Result) -> Result:
-        if self.held:
-            return result
-        return Result(result.values[: 2 + 3 * len(self.markers)], result.why)
-
-    def free(self, found: dict[str, Result]) -> dict[int, tuple[Array, Array]]:
+    def free(self) -> dict[int, tuple[Array, Array]]:
         """Pressures of the free unit from 0 on, and its outline's moves in mm, by side, 1 for +y."""
-        outline = found[self.case().key()].values[-2:] * self.enlarged
+        outline = self.found[self.case().key()].values[-2:] * self.enlarged
         at = np.array(self.pressures_kPa)
         sides: dict[int, tuple[Array, Array]] = {}
         for sign in (1, -1):
@@ -426,38 +415,37 @@ class _Plan:
                 sides[side] = at[rows], outward
         return sides
 
-    def walls(self, found: dict[str, Result]) -> Iterator[tuple[int, float, Run]]:
+    def walls(self) -> Iterator[tuple[int, float, Run]]:
         """Side and reach in mm of each wall, and the unit's run against it."""
         from scipy.interpolate import PchipInterpolator
 
-        for side, (pressure, outward) in self.free(found).items():
-            for reach in self.reaches:
+        for side, (pressure, outward) in self.free().items():
+            for reach in REACHES if self.whole(CONTACT) else FIRST_REACHES:
                 gap = (1 - reach) * outward[-1]
                 met = float(PchipInterpolator(outward, pressure)(gap))
                 steps = sorted(met + s * (pressure[-1] - met) for s in SHARES)
                 case = self.case(CONTACT, side * gap / self.enlarged)
                 yield side, reach * outward[-1], attrs.evolve(case, pressures_kPa=tuple(steps))
 
-    def sides(
-        self, found: dict[str, Result], reference: Array, rows: Sequence[int]
-    ) -> dict[int, ObstacleResponse]:
-        """The response to walls by side; `reference` (rows, k): of the free unit on the walls' mesh."""
+    def sides(self, rows: Sequence[int]) -> dict[int, ObstacleResponse]:
+        """The response to walls by side, of the channels in these rows."""
         from scipy.interpolate import CubicSpline
 
-        reached = np.isfinite(reference[0])
-        free = CubicSpline(np.array(self.pressures_kPa)[reached], reference[:, reached], axis=1)
+        reached = np.isfinite(self.coarse.values[0])
+        free = CubicSpline(
+            np.array(self.pressures_kPa)[reached], (self.larger * self.coarse.values)[:, reached], axis=1
+        )
         walls: dict[int, list[tuple[float, Array]]] = {}
-        for side, reach, case in self.walls(found):
-            values = found[case.key()].values
-            if not np.isfinite(values).all():
-                why = found[case.key()].why
-                _warn(f"a wall {reach:.3g} mm within reach at {self.scale:g}x is left out: {why}")
+        for side, reach, case in self.walls():
+            result = self.found[case.key()]
+            if not np.isfinite(result.values).all():
+                _warn(f"a wall {reach:.3g} mm within reach at {self.scale:g}x is left out: {result.why}")
                 continue
-            change = self.larger * values - free(case.pressures_kPa)
+            change = self.larger * result.values - free(case.pressures_kPa)
             # In the order of shares: the pressures ascend, those below 0 toward rest.
             change = change[rows][:, :: 1 if case.pressures_kPa[-1] > 0 else -1].T
             walls.setdefault(side, []).append((reach, change))
-        sides = self.free(found)
+        sides = self.free()
         return {
             side: ObstacleResponse(*sides[side], [r for r, _ in kept], SHARES, np.array([c for _, c in kept]))
             for side, kept in walls.items()
@@ -471,65 +459,68 @@ class _Plan:
         lengths = [self.enlarged] * (3 * len(self.markers))
         return np.array([1.0, self.enlarged**3, *lengths])[:, None]
 
-    def responses(self, settings: UnitSettings, found: dict[str, Result]) -> Iterator[UnitResponse]:
+    def responses(self) -> Iterator[UnitResponse]:
         """The response in each orientation."""
-        base, reference = self.base(found), self.reference(found)
-        rows = self._rows()
-        reached = np.isfinite(base.values[0] + reference.values[0])
+        every, why = np.array(self.pressures_kPa), self.base.why or self.coarse.why
+        reached = np.isfinite(self.base.values[0] + self.coarse.values[0])
         if np.count_nonzero(reached) < FEWEST:
             raise ConvergenceError(
-                f"the unit at {self.scale:g}x has an equilibrium at too few of the measured "
-                f"pressures: {base.why or reference.why}",
+                f"the unit at {self.scale:g}x has an equilibrium at too few of the measured pressures: {why}",
                 "unit_pressure",
                 "check the unit's moduli and wall against the specimen's",
             )
         if not reached.all():
-            missed = ", ".join(f"{p:g}" for p in np.array(self.pressures_kPa)[~reached])
-            _warn(f"The unit at {self.scale:g}x does not reach {missed} kPa: {base.why or reference.why}")
-        kept = np.ix_(np.array(rows), np.flatnonzero(reached))
-        walls = self.sides(found, self.larger * reference.values, rows) if CONTACT in settings.effects else {}
-        for orientation in self.orientations:
-            names = self.names(settings)
-            every = {n: self._variant(n, orientation, base, found, kept) for n in names}
-            variants = {n: v for n, v in every.items() if v is not None}
-            at = np.array(self.pressures_kPa)[reached]
-            values_ = (self.larger * base.values)[kept]
-            surface = self.surface(found, kept)
-            way = values_ - (self.larger * reference.values)[kept]
-            at, values_, way, variants, surface = _with_midpoints(at, values_, way, variants, surface)
-            variants |= self._mesh_errors(at, values_, way)
-            turn, axis = orientation
-            gap = (self.body.gap_mm or 0.0) * self.enlarged
-            how = (self.scale, turn, axis, walls, settings.discrepancy, gap)
-            yield UnitResponse(self.channels, at, values_, variants, *how, surface)
+            missed = ", ".join(f"{p:g}" for p in every[~reached])
+            _warn(f"The unit at {self.scale:g}x does not reach {missed} kPa: {why}")
+        channels = tuple(c for c in self.rows if c in self.measured)
+        rows = [self.rows.index(c) for c in channels]
+        at, shown = self._shown(rows, reached)
+        values = shown(self.base)
+        walls = self.sides(rows) if CONTACT in self.settings.effects else {}
+        surface, errors = self.surface(shown), self._mesh_errors(at, values, values - shown(self.coarse))
+        gap = (self.body.gap_mm or 0.0) * self.enlarged
+        for turn, axis in self.orientations:
+            found = {n: self._variant(n, (turn, axis), shown) for n in self.names}
+            variants = {n: v for n, v in found.items() if v is not None} | errors
+            how = (self.scale, turn, axis, walls, self.settings.discrepancy, gap)
+            yield UnitResponse(channels, at, values, variants, *how, surface)
 
-    def _variant(
-        self,
-        name: str,
-        orientation: tuple[float, Direction],
-        base: Result,
-        found: dict[str, Result],
-        kept: Any,
-    ) -> Variant | None:
+    def _shown(self, rows: Sequence[int], reached: Array) -> tuple[Array, Shown]:
+        """Pressures (k,) in kPa of the response, and a result's channels (c, k) there, nan if not reached.
+
+        Those that were reached, and in suction those midway: there walls and struts touch one after the
+        other, at pressures that differ between meshes by less than the interval of simulated pressures.
+        """
+        from scipy.interpolate import CubicSpline
+
+        at = np.array(self.pressures_kPa)[reached]
+        suction = at[at <= 0.0]
+        more = np.sort(np.concatenate([at, (suction[1:] + suction[:-1]) / 2.0]))
+
+        def shown(result: Result) -> Array:
+            values = (self.larger * result.values)[np.ix_(np.array(rows), np.flatnonzero(reached))]
+            if not np.isfinite(values).all():
+                return np.full((len(rows), len(more)), np.nan)
+            return np.asarray(CubicSpline(at, values, axis=-1)(more))
+
+        return more, shown
+
+    def _variant(self, name: str, orientation: tuple[float, Direction], shown: Shown) -> Variant | None:
         """The response to an effect at the sizes that could be computed; None where that is one alone."""
         effect = ON_UNITS[name]
-        null, grown = effect.parameter.null, self.enlarged**effect.length
-        sizes: list[float] = []
-        missed: list[float] = []
-        values: list[Array] = []
+        grown = self.enlarged**effect.length
+        sizes, missed, values = [], [], []
         for size in self.sizes(name):
-            if size == null:
-                result = base
-            else:
-                reference = self.reference(found)
-                result = self._continued(found[self.case(name, size, orientation).key()], reference)
-                result = self._taken_over(result, base, reference)
-            if np.isfinite(result.values[kept]).all():
-                sizes.append(size * grown)
-                values.append((self.larger * result.values)[kept])
-            else:
+            result = self.base
+            if size != effect.parameter.null:
+                result = self._taken_over(self._continued(self.result(self.case(name, size, orientation))))
+            response = shown(result)
+            if np.isnan(response).any():
                 missed.append(size * grown)
                 _warn(f"{name} = {size * grown:g} at {self.scale:g}x is left out: {result.why}")
+            else:
+                sizes.append(size * grown)
+                values.append(response)
         if len(sizes) < 2:
             return None
         # Beyond a size that was not, or could not be, computed the effect is unknown.
@@ -538,31 +529,32 @@ class _Plan:
         high = sizes[-1] if any(m > sizes[-1] for m in missed) else math.inf
         return Variant(effect.parameter.narrowed(low, high), np.array(sizes), np.array(values))
 
-    def _continued(self, result: Result, reference: Result) -> Result:
+    def _continued(self, result: Result) -> Result:
         """The result, its changes extrapolated in proportion to pressure where it ends before the readings.
 
         There it serves gauges alone, and a body that collapses costs most.
         """
         at, values = np.array(self.pressures_kPa), result.values.copy()
-        reached = np.isfinite(values[0])
+        coarse, reached = self.coarse.values, np.isfinite(values[0])
         low, high = self.readings_kPa
         for beyond, last in ((at < low, reached.argmax()), (at > high, len(at) - 1 - reached[::-1].argmax())):
             rows = np.flatnonzero(beyond & ~reached)
             if len(rows) and at[last] and not (at[rows] * at[last] < 0).any():
-                change = values[:, [last]] - reference.values[:, [last]]
-                values[:, rows] = reference.values[:, rows] + change * at[rows] / at[last]
+                change = values[:, [last]] - coarse[:, [last]]
+                values[:, rows] = coarse[:, rows] + change * at[rows] / at[last]
         return Result(values, result.why)
 
-    def _taken_over(self, result: Result, base: Result, reference: Result) -> Result:
-        """The base's response with an effect, from its change of the reference's.
+    def _taken_over(self, result: Result) -> Result:
+        """The base's response with an effect, from its change of the coarser mesh's.
 
         In proportion to how far both move from rest, which differs by the meshes' errors.
         """
         rest = self.pressures_kPa.index(0.0)
-        far, near = (r.values - r.values[:, [rest]] for r in (base, reference))
+        base, coarse = self.base.values, self.coarse.values
+        far, near = (values - values[:, [rest]] for values in (base, coarse))
         least = (LEAST_CHANGE * np.nanmax(np.abs(near), axis=1, keepdims=True)) ** 2
         ratio = (far * near + least) / np.maximum(near**2 + least, np.finfo(float).tiny)
-        return Result(base.values + ratio * (result.values - reference.values), result.why)
+        return Result(base + ratio * (result.values - coarse), result.why)
 
     def _mesh_errors(self, at: Array, base: Array, way: Array) -> dict[str, Variant]:
         """Errors of the model's mesh, everywhere and at each suction, at pressures (k,) in kPa.
@@ -580,75 +572,40 @@ class _Plan:
             found[name] = Variant(p, sizes, np.array([base + size * share * way for size in sizes]))
         return found
 
-    def _rows(self) -> list[int]:
-        if self.held:
-            return [0]
-        order = [ANGLE, VOLUME, *(f"marker{m.number}_{a}_mm" for m in self.markers for a in AXES)]
-        return [order.index(c) for c in self.channels]
-
-
-def _with_midpoints(
-    at: Array, base: Array, way: Array, variants: dict[str, Variant], surface: Surface | None
-) -> tuple[Array, Array, Array, dict[str, Variant], Surface | None]:
-    """Pressures (k,) in kPa with those midway in suction, and the rest of a response at these.
-
-    There walls and struts touch one after the other, at pressures that differ between meshes by less than the
-    interval of simulated pressures.
-    """
-    from scipy.interpolate import CubicSpline
-
-    suction = at[at <= 0.0]
-    more = np.sort(np.concatenate([at, (suction[1:] + suction[:-1]) / 2.0]))
-
-    def between(values: Array) -> Array:
-        return np.asarray(CubicSpline(at, values, axis=-1)(more))
-
-    finer = {n: attrs.evolve(v, values=between(v.values)) for n, v in variants.items()}
-    if surface:
-        surface = attrs.evolve(surface, values=between(surface.values))
-    return more, between(base), between(way), finer, surface
-
 
 def _warn(text: str) -> None:
     warnings.warn(text, UnitResponseWarning, stacklevel=4)
 
 
-def _found(
-    cases: dict[str, Run], workers: int, cache: Path | None, report: Progress, alone: int = 0
-) -> dict[str, Result]:
-    """Results by key, from the cache where they are there, and stored as soon as one is found.
+def _solve(
+    found: dict[str, Result],
+    cases: dict[str, Run],
+    workers: int,
+    cache: Path | None,
+    report: Progress,
+    alone: int = 0,
+) -> None:
+    """Add results by key, from the cache where they are there; what is computed is stored there at once.
 
     alone: how many of the cases, the first, are run before the others.
     """
     table = None if cache is None else Cache(cache)
-    found: dict[str, Result] = {}
-    for key, case in cases.items():
-        result = None if table is None else _stored(table, key, case)
-        if result is not None:
-            found[key] = result
-    missing = {key: case for key, case in cases.items() if key not in found}
+    stored = {key: _stored(table, key, case) for key, case in cases.items() if table is not None}
+    kept = {key: result for key, result in stored.items() if result is not None}
+    found |= kept
+    missing = [key for key in cases if key not in kept]
     # One run here first: it compiles the kernels for the other processes.
-    first = max(sum(key in missing for key in list(cases)[:alone]), 0 if found else 1)
-    for key, result in _solved(missing, first, workers, cache):
-        found[key] = result
-        if table is not None:
-            table.put("unit", key, {"values": result.values, "why": np.array(result.why)})
-        case = cases[key]
-        what = f"{case.effect} = {case.size:g}" if case.effect else "base"
-        report(f"unit, {what}", len(found) / len(cases))
-    return found
-
-
-def _solved(
-    missing: dict[str, Run], first: int, workers: int, cache: Path | None
-) -> Iterator[tuple[str, Result]]:
-    """Results by key; the first runs in this process, the others in separate ones."""
-    keys, cases = list(missing), list(missing.values())
-    first = first if workers > 1 else len(cases)
-    for key, case in zip(keys[:first], cases[:first], strict=True):
-        yield key, run(case, cache)
-    for number, result in each(partial(run, cache=cache), cases[first:], workers, "unit_pressure"):
-        yield keys[first + number], result
+    done, first = len(kept), max(len({*missing}.intersection([*cases][:alone])), 0 if kept else 1)
+    for keys, processes in ((missing[:first], 1), (missing[first:], workers)):
+        tasks = [cases[key] for key in keys]
+        for number, result in each(partial(run, cache=cache), tasks, processes, "unit_pressure"):
+            key, case = keys[number], tasks[number]
+            found[key] = result
+            if table is not None:
+                table.put("unit", key, {"values": result.values, "why": np.array(result.why)})
+            what = f"{case.effect} = {case.size:g}" if case.effect else "base"
+            done += 1
+            report(f"unit, {what}", done / len(cases))
 
 
 def _stored(table: Cache, key: str, case: Run) -> Result | None:
