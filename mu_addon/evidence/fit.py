@@ -204,6 +204,18 @@ class Fitter:
         """Return `predict`; None where the model has no finite prediction (`Record.possible`)."""
         return self.record.possible(self.simulator, values)
 
+    def response(self, values: Mapping[str, float], record: Record | None = None) -> Array:
+        """Change (N,) of a record's prediction by the first nuisance that is not a zero; ones without any.
+
+        record: another one than the fitter's own.
+        """
+        record = record or self.record
+        if not self.curved:
+            return np.ones(len(record))
+        p = self.curved[0]
+        moved = record.predict(self.simulator, {**values, p.name: values[p.name] + p.step})
+        return np.asarray((moved - record.predict(self.simulator, values)) / p.step)
+
     def fit(
         self,
         effects: Sequence[Effect] = (),

@@ -197,23 +197,13 @@ def _permuted(fitter: Fitter, judged: Record, base: Fit, extended: Fit) -> Array
 
 def _black_box(fitter: Fitter, judged: Record, base: Fit, many: int) -> Array:
     """The base with as many arbitrary corrections of its response as the effects have parameters."""
-    return _with_columns(
-        fitter,
-        judged,
-        base,
-        _corrections(fitter, fitter.record, base, many),
-        _corrections(fitter, judged, base, many),
-    )
+    fitted, applied = (_corrections(fitter, r, base, many) for r in (fitter.record, judged))
+    return _with_columns(fitter, judged, base, fitted, applied)
 
 
 def _corrections(fitter: Fitter, r: Record, base: Fit, many: int) -> Array:
     """The base's response to its modulus times powers of its drives, and of the time since its start."""
-    plain = r.predict(fitter.simulator, base.values)
-    response = np.ones(len(r))
-    if fitter.curved:
-        p = fitter.curved[0]
-        moved = {**base.values, p.name: base.values[p.name] + p.step}
-        response = (r.predict(fitter.simulator, moved) - plain) / p.step
+    response = fitter.response(base.values, r)
     drives = ("pressure_kPa", "strain", "added_mass_g", "angle_deg")
 
     def driven(e: Experiment) -> Array:

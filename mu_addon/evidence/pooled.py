@@ -15,6 +15,7 @@ from .effects import DECLARED
 from .effects.declaration import ALL, BENCH
 from .fit import Fit, Fitter
 from .owned import of_specimens, scaled_by
+from .spanned import basis
 
 Array = np.ndarray[Any, Any]
 
@@ -228,7 +229,7 @@ def _spread(fitter: Fitter, fit: Fit, effect: Effect, values: Mapping[str, float
             return None
         slopes[:, i] = (moved - at) / step
     own = {key for key, _ in sizes}
-    q = _directions(fit.jacobian[:, [i for i, key in enumerate(fit.keys) if key not in own]])
+    q = basis(fit.jacobian[:, [i for i, key in enumerate(fit.keys) if key not in own]])
     white = fitter.project(slopes)
     white -= q @ (q.T @ white)
     # As it would be with all values at 0.
@@ -238,10 +239,3 @@ def _spread(fitter: Fitter, fit: Fit, effect: Effect, values: Mapping[str, float
     sign = -1.0 if has_one_sign(p) and p.null == p.high else 1.0
     found = spread_of(sign * white, residual, max(p.high - p.null, p.null - p.low), has_one_sign(p))
     return attrs.evolve(found, values=sign * found.values) if found.value > 0.0 else None
-
-
-def _directions(columns: Array) -> Array:
-    """Orthonormal basis of the given columns, without null directions."""
-    length = np.linalg.norm(columns, axis=0)
-    u, s, _ = np.linalg.svd(columns[:, length > 0] / length[length > 0], full_matrices=False)
-    return np.asarray(u[:, s > 1e-9 * max(s.max(initial=0.0), 1e-300)])

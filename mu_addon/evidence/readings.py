@@ -127,9 +127,7 @@ def dwell(values: Array) -> float:
 
     1 where they change at every sample, as in a ramp before a hold.
     """
-    seen = values[np.isfinite(values)]
-    ends = np.concatenate([[0], 1 + np.flatnonzero(np.diff(seen)), [len(seen)]])
-    return float(np.median(np.diff(ends))) if len(seen) else 1.0
+    return float(np.median(_runs(values)))
 
 
 def stretch(values: Array) -> float:
@@ -137,10 +135,15 @@ def stretch(values: Array) -> float:
 
     Long where a part of a record is held, at any speed of the rest.
     """
+    runs = _runs(values)
+    return float(runs @ runs / runs.sum())
+
+
+def _runs(values: Array) -> Array:
+    """Lengths of the runs of unchanged readings (n,); 1 where there are none."""
     seen = values[np.isfinite(values)]
     ends = np.concatenate([[0], 1 + np.flatnonzero(np.diff(seen)), [len(seen)]])
-    runs = np.diff(ends)
-    return float(runs @ runs / len(seen)) if len(seen) else 1.0
+    return np.diff(ends) if len(seen) else np.ones(1)
 
 
 def between_steps(time_s: Array, values: Array) -> Array:

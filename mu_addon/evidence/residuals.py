@@ -21,6 +21,7 @@ from .noise import cycle_s, harmonics
 from .prediction.unit_pressure import KIND as UNIT
 from .record import KNOWN, Record, Series, repeats
 from .ringing import modes, ringing
+from .spanned import basis, unit
 
 Array = np.ndarray[Any, Any]
 
@@ -157,17 +158,12 @@ class _Left:
     @cached_property
     def fitted(self) -> Array:
         """Orthonormal columns (N, k) that span what is fitted, zeros among it."""
-        return np.hstack([self.fitter.zeros_basis, _basis(self.fit.jacobian)])
+        return np.hstack([self.fitter.zeros_basis, basis(self.fit.jacobian, NEAR)])
 
     @cached_property
     def response(self) -> Array:
-        """Change (N,) of the prediction by the first nuisance that is not a zero."""
-        fitter, values = self.fitter, self.fit.values
-        if not fitter.curved:
-            return np.ones(len(fitter.record))
-        p = fitter.curved[0]
-        moved = {**values, p.name: values[p.name] + p.step}
-        return (fitter.predict(moved) - fitter.predict(values)) / p.step
+        """See `Fitter.response`."""
+        return self.fitter.response(self.fit.values)
 
     @cached_property
     def channels(self) -> dict[str, Array]:
@@ -190,12 +186,12 @@ class _Left:
     def gained(self, white: Array, rows: Any = slice(None)) -> tuple[float, int]:
         """Chi squared that whitened columns (n, d) of some rows take beside what is fitted, and their rank.
 
-        Near dependences are left out, as in `_basis`; so is a column that is fitted but for rounding.
+        Near dependences are left out, as in `basis`; so is a column that is fitted but for rounding.
         """
-        unit, q = _unit(white), self.fitted[rows]
-        onto = q.T @ unit
-        gram = unit.T @ unit - onto.T @ onto
-        along = unit.T @ self.residual[rows] - onto.T @ (self.fitted.T @ self.residual)
+        one, q = unit(white), self.fitted[rows]
+        onto = q.T @ one
+        gram = one.T @ one - onto.T @ onto
+        along = one.T @ self.residual[rows] - onto.T @ (self.fitted.T @ self.residual)
         size = np.sqrt(np.maximum(np.diag(gram), 0.0))
         kept = size > 1e-6
         size = size[kept]
@@ -242,7 +238,9 @@ def _fitted_tests(left: _Left) -> list[Dependence]:
     known = [s for s in record.series if s.group == KNOWN]
     if known:
         square = sum(float(left.residual[s.at] @ left.residual[s.at]) for s in known)
-        dof = max(sum(s.at.stop - s.at.start for s in known) - len(left.fit.keys), 1)
+        # A nuisance that no reading depends on, as a density without a mass, takes none.
+        fitted = np.count_nonzero(left.fit.jacobian.any(axis=0))
+        dof = max(sum(s.at.stop - s.at.start for s in known) - fitted, 1)
         found.append(_by_gain("spread", square, dof, 0.0, "all"))
     if len(known) == len(record.series):
         return found
@@ -279,7 +277,7 @@ def taken_by_scales(fitter: Fitter, fit: Fit) -> float:
     """Chi squared that a scale factor of each experiment's response takes from a fit's residual."""
     of, response = fitter.record.of_experiment, _Left(fitter, fit, {}).response
     own = response[:, None] * (of[:, None] == np.arange(len(fitter.record.experiments)))
-    return float(np.sum((_basis(fitter.project(own)).T @ fit.residual) ** 2))
+    return float(np.sum((basis(fitter.project(own), NEAR).T @ fit.residual) ** 2))
 
 
 def _angles(left: _Left) -> dict[int, Array]:
@@ -336,7 +334,7 @@ def _by_turn(left: _Left) -> list[Dependence]:
         apart = np.unique(np.round(turned % (2.0 * np.pi), 6))
         for order in range(1, min(HARMONICS, (len(apart) - 1) // 2) + 1):
             wave = np.stack([np.cos(order * turned), np.sin(order * turned)], axis=1)
-            q = _basis(wave - wave.mean(axis=0))
+            q = basis(wave - wave.mean(axis=0), NEAR)
             share = float(np.sum((q.T @ misfit) ** 2) / max(misfit @ misfit, 1e-300))
             dof = q.shape[1]
             p = float(beta.sf(min(share, 1.0), dof / 2, max(free - dof, 1) / 2))
@@ -430,7 +428,7 @@ def _chambers(left: _Left) -> list[Dependence]:
     if not dof:
         return []
     each = left.fitter.project(response * (chamber[:, None] == np.arange(len(levels))))
-    most = levels[int(np.argmax(np.abs(_unit(each).T @ left.residual)))]
+    most = levels[int(np.argmax(np.abs(unit(each).T @ left.residual)))]
     named = next(c for c, level in place.items() if level == most).partition("_")[0]
     where = f"{named}, {most:g} chambers from the inlet"
     return [_by_gain("chamber", gain, dof, left.saved(members), where)]
@@ -479,19 +477,6 @@ def _jointly(name: str, singles: Sequence[Dependence], spare: float, where: str)
     return [_likelier(_by_gain(name, gain, dof, spare, where), single)]
 
 
-def _unit(columns: Array) -> Array:
-    length = np.linalg.norm(columns, axis=0)
-    return np.asarray(columns / np.where(length > 0, length, 1.0))
-
-
-def _basis(columns: Array) -> Array:
-    """Orthonormal basis of columns, near dependences left out."""
-    if not columns.shape[1]:
-        return columns
-    u, sizes, _ = np.linalg.svd(_unit(columns), full_matrices=False)
-    return np.asarray(u[:, sizes > NEAR])
-
-
 def _phase(left: _Left) -> list[Dependence]:
     """Test for structure that repeats in every cycle: its harmonics, by channel and experiment."""
     singles, members = [], []
@@ -500,7 +485,7 @@ def _phase(left: _Left) -> list[Dependence]:
         key = s.experiment, s.group, s.clock
         if key not in bases:
             waves = harmonics(left.record, s)
-            bases[key] = None if waves is None else _basis(left.fitter.whitening.series(s, waves))
+            bases[key] = None if waves is None else basis(left.fitter.whitening.series(s, waves), NEAR)
         b = bases[key]
         if b is not None:
             gain = float(np.sum((b.T @ left.residual[s.at]) ** 2))
@@ -601,7 +586,7 @@ def _steps(left: _Left) -> list[Dependence]:
         key = (s.group, b, s.sample_s, s.count[0])
         if key not in known:
             jump = np.tril(np.ones((b, b)))[:, 4:-4]
-            known[key] = _unit(left.fitter.whitening.series(s, jump - jump.mean(axis=0)))
+            known[key] = unit(left.fitter.whitening.series(s, jump - jump.mean(axis=0)))
         z = np.abs(known[key].T @ left.residual[s.at])
         tried += len(z)
         at = int(np.argmax(z))
@@ -667,7 +652,7 @@ def _breaks(left: _Left) -> list[Dependence]:
     later = np.where(of[:, None] > test, white[:, :1], np.where(of[:, None] == test, white[:, eighth], 0.0))
     level, gains = left.fitter.whitening(np.ones(len(record))), np.zeros(len(moments))
     for rows in left.channels.values():
-        q = _basis(np.column_stack([level[rows], left.fit.jacobian[rows]]))
+        q = basis(np.column_stack([level[rows], left.fit.jacobian[rows]]), NEAR)
         before = np.sum(later[rows] ** 2, axis=0)
         own = later[rows] - q @ (q.T @ later[rows])
         square = np.sum(own**2, axis=0)

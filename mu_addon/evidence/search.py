@@ -83,24 +83,20 @@ def select(
         if level and (p < FALSE_ALARM_RATE or structure(strict_table(fitter, chosen))):
             pool = hypotheses(fitter, other_seeds(levels[-1]), effects, progress, known=pool)
             p = false_alarm_probability(chosen, seen, gain_of(fitter, chosen, pool[0]))
-        if level == 0 and p >= FALSE_ALARM_RATE:
+        if not level and (p >= FALSE_ALARM_RATE or loss(fitter, chosen, pool[0]) <= 0.0):
+            # A first effect may need a second, that alternates from test to test, to predict any test.
             pair = _hidden_pair(fitter, effects, seen, base, pool, progress)
             if pair is not None:
                 p_best, chosen = pair
                 ps, levels = [p_best, p_best], [pool, [chosen]]
+            elif p < FALSE_ALARM_RATE:
+                doubted = f"{pool[0].names[-1]} fits, but its leave-one-out prediction fails"
             break
         if p >= FALSE_ALARM_RATE or of_the_law(chosen, pool[0], least):
             break
-        if loss(fitter, chosen, pool[0]) <= 0.0:
-            # It cannot be compared with earlier ones; its part is left as structure. A first one may need a
-            # second, that alternates from test to test, to predict any test.
-            pair = None if level else _hidden_pair(fitter, effects, seen, base, pool, progress)
-            if pair is not None:
-                p_best, chosen = pair
-                ps, levels = [p_best, p_best], [pool, [chosen]]
-            elif not level:
-                doubted = f"{pool[0].names[-1]} fits, but its leave-one-out prediction fails"
-            other = _foretelling(fitter, effects, seen, chosen, pool, progress) if level else None
+        if level and loss(fitter, chosen, pool[0]) <= 0.0:
+            # It cannot be compared with earlier ones; its part is left as structure.
+            other = _foretelling(fitter, effects, seen, chosen, pool, progress)
             if other is None:
                 break
             p, pool = other[0], [other[1], *pool]

@@ -14,6 +14,7 @@ from .effect import Effect, Parameter
 from .fit import Fitter
 from .record import Record
 from .simulator import Composite
+from .spanned import unit
 
 Array = np.ndarray[Any, Any]
 
@@ -210,11 +211,5 @@ def similarity(found: Sequence[Sensitivity]) -> Array:
 
     0 for an effect that nuisances absorb entirely.
     """
-    unit = _unit(found)
-    return np.asarray(unit.T @ unit)
-
-
-def _unit(found: Sequence[Sensitivity]) -> Array:
-    columns = np.stack([s.column if s.unabsorbed > ABSORBED else 0.0 * s.column for s in found], axis=1)
-    length = np.linalg.norm(columns, axis=0)
-    return np.asarray(columns / np.where(length > 0, length, 1.0))
+    columns = unit(np.stack([s.column if s.unabsorbed > ABSORBED else 0.0 * s.column for s in found], axis=1))
+    return np.asarray(columns.T @ columns)

@@ -15,8 +15,8 @@ from mu_addon.diagnose.words import sentence
 from mu_addon.evidence.chamber import ROOM_K, ATMOSPHERE_kPa
 from mu_addon.evidence.diagnosis import diagnose
 from mu_addon.evidence.effect import Parameter
+from mu_addon.evidence.instants import finer
 from mu_addon.evidence.plausibility import value_at_a_bound
-from mu_addon.evidence.prediction.instants import finer
 from mu_addon.evidence.prediction.pressure_step import PressureStep
 from mu_addon.evidence.prediction.waveguide_bending import WaveguideVoltage
 from mu_addon.evidence.ringing import swinging

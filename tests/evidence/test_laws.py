@@ -9,9 +9,9 @@ from benchmarks.evidence.second_code.recording import write
 from benchmarks.evidence.second_code.sets import Order, made
 from mu_addon.evidence.acceptance import of_the_law
 from mu_addon.evidence.diagnosis import diagnose
-from mu_addon.evidence.effects.mullins_softening import turns
 from mu_addon.evidence.effects.viscoelasticity import spread_lag
 from mu_addon.evidence.found_causes import LAW
+from mu_addon.evidence.instants import turns
 from mu_addon.evidence.lags import first_order_lag
 from mu_addon.evidence.prediction.coupon import CouponStress
 from mu_addon.measured import read_folder

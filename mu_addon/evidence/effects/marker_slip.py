@@ -13,6 +13,7 @@ import numpy as np
 from ...design.parameters import Chambers
 from ...measured import Experiment
 from ..lags import DEADBAND_kPa, play_operator
+from ..spanned import basis
 from .declaration import ALL, CYCLED, Array, Data, Declaration, Law, Parameter, Setting, Values
 
 ANGLE = "angle_deg"
@@ -31,8 +32,6 @@ SAMPLES = 20_000
 PLAIN = 10.0
 # Deviations from the median of itself and its neighbours beyond which a reading is isolated.
 ALONE = 6.0
-# Directions of unit columns with less than this are dropped.
-NEAR = 1e-6
 
 
 class Recordings:
@@ -256,7 +255,7 @@ def _best_step(number: int, axes: str, members: Sequence[Experiment], recordings
     if n < 3 * columns.shape[1] + 2 * ENDS:
         return None
     first = np.diff(of, prepend=-1) != 0
-    q = _basis(columns)
+    q = basis(columns)
     target = _without_lone(target - q @ (q.T @ target))
     at, step, gain, correlation = n // 2, np.zeros(len(own)), 0.0, 0.0
     for _ in range(3):
@@ -299,7 +298,7 @@ def _step_of(
         after = np.cumsum((later**power)[::-1, None] * v[::-1], axis=0)[::-1]
         return after + (jump**power - later**power)[:, None] * v
 
-    q = _basis(white(columns))
+    q = basis(white(columns))
     r = white(target)
     r -= q @ (q.T @ r)
     whole = along(np.ones((n, 1)), 2)[:, 0]
@@ -326,13 +325,6 @@ def _without_lone(left: Array) -> Array:
     # Half of all readings are their own neighbourhood's median, so the mean gives their spread.
     alone = apart > ALONE * np.maximum(apart.mean(axis=0), 1e-300) * 2.0
     return np.where(alone, middle, left)
-
-
-def _basis(columns: Array) -> Array:
-    """Orthonormal basis of columns (n, d), near dependences left out."""
-    length = np.linalg.norm(columns, axis=0)
-    u, sizes, _ = np.linalg.svd(columns / np.where(length > 0, length, 1.0), full_matrices=False)
-    return np.asarray(u[:, sizes > NEAR])
 
 
 def _whose(e: Experiment) -> tuple[str, float]:

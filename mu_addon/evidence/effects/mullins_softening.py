@@ -5,6 +5,7 @@ from functools import lru_cache
 
 import numpy as np
 
+from ..instants import turns
 from .declaration import CYCLED, IN_MODEL, MACHINE, Array, Declaration, Law, Parameter, Setting, Values
 
 BY_ENERGY = (
@@ -29,8 +30,6 @@ FEWEST = 5
 # Gauss-Legendre points on 0..1 for the energy: exact for laws up to degree 15.
 _AT, _WEIGHT = np.polynomial.legendre.leggauss(8)
 _AT, _WEIGHT = (_AT + 1) / 2, _WEIGHT / 2
-# Share of the change of slope at a turn by which slopes beside it may differ from straight lines'.
-STRAIGHT = 0.2
 
 
 def _left(energy: Array, before: float, softening: float, width: float) -> Array:
@@ -98,26 +97,6 @@ def _largest(t: bytes, size: bytes, before: float) -> Array:
     found = np.maximum(np.maximum.accumulate(so_far), before)
     found.flags.writeable = False
     return found
-
-
-def turns(t: Array, x: Array) -> Array:
-    """The largest value (n,) since the sample before, where x turns downward between two samples.
-
-    t (n,), x (n,): times and samples. A machine moves straight to a turning point and back, seldom at a
-    sample: lines through the samples on either side meet there. x itself elsewhere, and where x is round.
-    """
-    found = x.copy()
-    step = np.diff(t)
-    slope = np.diff(x) / step
-    # Five steps: two on the way up, that of the turn, two on the way down.
-    before, up, down, after = slope[:-4], slope[1:-3], slope[3:-1], slope[4:]
-    first, last, h = x[2:-3], x[3:-2], step[2:-2]
-    bend = up - down
-    straight = np.maximum(np.abs(before - up), np.abs(after - down)) < STRAIGHT * bend
-    at = np.divide(last - down * h - first, bend, out=np.zeros_like(h), where=straight)
-    turned = straight & (up > 0) & (down < 0) & (at > 0) & (at < h)
-    found[3:-2][turned] = (first + up * at)[turned]
-    return np.maximum(found, x)
 
 
 def _energy(law: Callable[[Array], Array], strain: Array) -> Array:

@@ -10,8 +10,8 @@ import numpy as np
 
 from ...measured import Experiment
 from ..effects.declaration import Setting
+from ..instants import SHARE, finer
 from ..parameter import Parameter
-from .instants import SHARE, finer
 from .unit_pressure import UnitPressure, UnitResponse
 
 Array = np.ndarray[Any, Any]

@@ -12,9 +12,9 @@ from ...errors import ConvergenceError
 from ...measured import Experiment
 from ..effects import Acting
 from ..effects.declaration import Setting
+from ..instants import finer
 from ..load_cell import ZERO_SHARE, kPa_per_N
 from ..parameter import Parameter
-from .instants import finer
 
 Array = np.ndarray[Any, Any]
 # Stress (n,) in kPa of strain (n,) at rest: 0 at 0, and rising.
