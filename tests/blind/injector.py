@@ -2,9 +2,8 @@
 
 An order holds a seed, and may hold: effect (a name, or several), times (its detection limit), values (sizes
 that are not drawn by what can be seen), unit ("written" or "simulated", or a kind of experiment that
-`machines` has a bench of), noise ("one" slow process beside white noise, "two", or "white"), gauge (the share
-of its range that is the noise of what reads the drive), and, for a unit, count, most, dt, rho, level,
-held_out, dead_load, markers.
+`machines` has a bench of), noise ("one" slow process beside white noise, "two", or "white"), and, for a unit,
+count, most, dt, level.
 """
 
 import math
@@ -39,25 +38,12 @@ SHAPES = {
     "resonance.damping": (0.02, 0.08),
     "marker_slip.marker2_direction_deg": (5.0, 170.0),
 }
-# What a beam of the unit's resin, the same whatever a gauge of pressure reads, sags by.
-SAG_mm_PER_g = 0.4
-
-
-def held_out(dt):
-    """Experiments nobody fits: another rate, another orientation, another scale."""
-    middle = analytic.triangle(dt, 9.0, 3, 0.0, 33.0)
-    return [
-        ("later, another rate", *middle, {"role": "held_out"}),
-        ("later, another way up", *middle, {"role": "held_out", "orientation_deg": 270.0}),
-        ("later, larger", *middle, {"role": "held_out", "scale": 1.5, "specimen": "B"}),
-    ]
 
 
 def gauge_noise(order):
     """The gauge's own white noise as a share of what it goes through: none in half of the sets."""
     rng = np.random.default_rng([order["seed"], 1])
-    share = float(np.exp(rng.uniform(np.log(1e-4), np.log(1e-3))) * rng.integers(2))
-    return order.get("gauge", share)
+    return float(np.exp(rng.uniform(np.log(1e-4), np.log(1e-3))) * rng.integers(2))
 
 
 def gauged(order, number, values):
@@ -96,7 +82,6 @@ def hide_in_unit(order, folder):
     dt = float(np.exp(rng.uniform(np.log(0.1), np.log(0.5))))
     dt = round(order.get("dt", dt), 3)
     rho = float(rng.uniform(0.5, 0.97))
-    rho = order.get("rho", rho)
     fewest = max([3, *(FEWEST.get(e, 3) for e in effects)])
     count = int(order.get("count", rng.integers(fewest, max(order.get("most", 10), fewest) + 1)))
     level = float(np.exp(rng.uniform(np.log(0.03), np.log(0.2))))
@@ -116,13 +101,9 @@ def hide_in_unit(order, folder):
     # Sizes that were ordered are taken as they are; others are drawn by what can be seen.
     for name in effects if "values" not in order else []:
         values |= sized(rng, unit, tests, name, times, base, noise, total)
-    if order.get("held_out"):
-        tests = tests + held_out(dt)
     truth = observe(tests, values, unit)
     clock = float(rng.uniform(0.0, 500.0))
     write(folder, rng, tests, truth, zeros, noise, order, clock)
-    if order.get("dead_load"):
-        add_dead_load(folder, rng, values["modulus_factor"])
 
 
 def hide_machine(order, folder):
@@ -305,14 +286,12 @@ def write(folder, rng, tests, truth, zeros, noise, order, clock):
             return values + drawn(rng, time, *noise[c], many=many)
 
         for c, v, zero in zip(analytic.CHANNELS, y, zeros, strict=True):
-            if order.get("markers", True) or c == "angle_deg":
-                head.append(c)
-                columns.append(read(v + zero, c))
+            head.append(c)
+            columns.append(read(v + zero, c))
         for m in (1, 2, 3):
-            if f"marker{m}_y_mm" in head:
-                # Out of the plane nothing moves; the camera sees noise there too.
-                head.append(f"marker{m}_x_mm")
-                columns.append(read(np.zeros(len(time)), "marker1_y_mm"))
+            # Out of the plane nothing moves; the camera sees noise there too.
+            head.append(f"marker{m}_x_mm")
+            columns.append(read(np.zeros(len(time)), "marker1_y_mm"))
         text = ["# bench record", ",".join(head)]
         text += [",".join(f"{v:.6f}" for v in row) for row in np.stack(columns, axis=1)]
         (folder / f"run{k}.csv").write_text("\n".join(text) + "\n")
@@ -321,7 +300,7 @@ def write(folder, rng, tests, truth, zeros, noise, order, clock):
             f'name = "{name}"',
             'kind = "unit_pressure"',
             f'file = "run{k}.csv"',
-            f'role = "{how.get("role", "fit")}"',
+            'role = "fit"',
             f"scale = {how.get('scale', 1.0)}",
             f"orientation_deg = {how.get('orientation_deg', 0.0)}",
             f'specimen = "{how.get("specimen", "A")}"',
@@ -330,28 +309,6 @@ def write(folder, rng, tests, truth, zeros, noise, order, clock):
             "",
         ]
     (folder / "experiments.toml").write_text("\n".join(lines))
-
-
-def add_dead_load(folder, rng, modulus_factor):
-    """Two more experiments: a beam of the same resin under known masses."""
-    mass = np.arange(0.0, 110.0, 10.0)
-    lines = []
-    for k in range(2):
-        sag = SAG_mm_PER_g * mass / modulus_factor + rng.normal(0.0, 0.05, len(mass))
-        rows = "\n".join(f"{m:.3f},{s:.6f}" for m, s in zip(mass, sag, strict=True))
-        (folder / f"beam{k}.csv").write_text(f"added_mass_g,tip_deflection_mm\n{rows}\n")
-        lines += [
-            "",
-            "[[experiment]]",
-            f'name = "dead load {k}"',
-            'kind = "beam_deadweight"',
-            f'file = "beam{k}.csv"',
-            'role = "fit"',
-            "section_mm = [10.0, 10.0]",
-            "length_mm = 60.0",
-        ]
-    with (folder / "experiments.toml").open("a") as stream:
-        stream.write("\n".join(lines) + "\n")
 
 
 def drawn(rng, time, white, slow, time_s, many=False):

@@ -5,7 +5,7 @@ from pathlib import Path
 import numpy as np
 
 from mu_addon.evidence.effect import Parameter
-from mu_addon.evidence.prediction.unit_pressure import UnitPressure, UnitResponse, Variant
+from mu_addon.evidence.prediction.unit_pressure import UnitPressure, UnitResponse, Variant, nuisances
 from mu_addon.evidence.simulator import Composite
 from mu_addon.measured import Experiment
 
@@ -162,3 +162,16 @@ def measured(rng, values, dt=0.2, count=10, level=0.1, rho=0.9, slow_share=0.7, 
         more = {k: getattr(e, k) for k in ("scale", "orientation_deg", "temperature_C", "specimen", "role")}
         found.append(experiment(e.name, e["time_s"], e["pressure_kPa"], observed, **more))
     return found
+
+
+class DeadLoad:
+    """A beam of the unit's resin: its sag tells the modulus, whatever a gauge of pressure says."""
+
+    nuisances = nuisances(())
+    effects = ()
+
+    def channels(self, experiment):
+        return ("tip_deflection_mm",)
+
+    def predict(self, experiment, values):
+        return 0.4 * experiment["added_mass_g"][None] / values.get("modulus_factor", 1.0)

@@ -8,7 +8,7 @@ from mu_addon.evidence.fit import Fitter
 from mu_addon.evidence.noise import Source
 from mu_addon.evidence.record import record
 from mu_addon.evidence.simulator import Composite
-from tests.evidence.stand_ins import made
+from tests.evidence.bench import experiment
 
 KIND, STOP, SLOPE = "lattice_compression", "contact.reach_mm", "overcure.offset_mm"
 
@@ -35,9 +35,8 @@ def fitter():
     """To a force that stops at 5, with a wave that no parameter takes."""
     strain = np.linspace(0.0, 10.0, 101)
     force = np.minimum(strain, 5.0) + 0.2 * np.sin(20.0 * strain)
-    experiment = made("pressed", KIND, {"strain": strain, "stress_kPa": force})
     model = Composite({KIND: Stopped()})
-    data = record([experiment], model)
+    data = record([experiment(KIND, {"strain": strain, "stress_kPa": force})], model)
     return Fitter(data, model, dict.fromkeys(data.groups, Source(0.05, 1e-6, 1.0)))
 
 

@@ -8,7 +8,8 @@ from mu_addon.evidence.fit import Fitter
 from mu_addon.evidence.noise import Source, Whitening, repeated
 from mu_addon.evidence.record import record
 from mu_addon.evidence.simulator import Composite
-from tests.evidence import analytic, stand_ins
+from tests.evidence import analytic
+from tests.evidence.bench import experiment
 
 
 @pytest.mark.parametrize("blocks", [1000, 40])
@@ -119,8 +120,8 @@ def test_without_a_clock_rows_that_repeat_tell_the_noise():
     true = 0.05
     # What no effect of the library explains, since it has none, and what a line does not fit.
     sag = 0.4 * mass + 2e-3 * mass**2 + rng.normal(0.0, true, len(mass))
-    e = stand_ins.made("loads", "beam_deadweight", {"added_mass_g": mass, "tip_deflection_mm": sag})
-    model = Composite({"beam_deadweight": stand_ins.DeadLoad()})
+    e = experiment("beam_deadweight", {"added_mass_g": mass, "tip_deflection_mm": sag})
+    model = Composite({"beam_deadweight": analytic.DeadLoad()})
     source = noise_of(record([e], model), model)["beam_deadweight tip_deflection"]
     assert source.slow == 0.0
     assert true / 1.3 < source.white < 1.6 * true

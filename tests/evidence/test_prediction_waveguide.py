@@ -37,20 +37,6 @@ def test_room_light_that_grows_adds_more():
     np.testing.assert_allclose(found, 0.2 * (1 + 3.0 * TIME / 3600.0), rtol=1e-9)
 
 
-def test_below_its_onset_nothing_more_is_lost():
-    found = predict(optical_nonlinearity__excess=2.0, optical_nonlinearity__onset_deg=40.0)
-    below = np.abs(ANGLE) <= 40.0
-    np.testing.assert_array_equal(found[below], predict()[below])
-    assert (found[ANGLE > 40.0] < predict()[ANGLE > 40.0]).all()
-
-
-def test_a_late_clock_reads_earlier_angles():
-    found = predict(clock_offset__offset_s=1.0)
-    inner = slice(10, -10)
-    expected = 3.0 * np.exp(-0.012 * np.interp(TIME - 1.0, TIME, ANGLE))
-    np.testing.assert_allclose(found[inner], expected[inner], rtol=1e-12)
-
-
 def test_a_delay_of_a_part_of_a_sample_is_no_chord():
     """Chords of a bend with 16 samples a turn miss 0.9 deg of it, as much as 40 ms of delay."""
     time = np.arange(0.0, 200.0, 1.0)

@@ -6,11 +6,41 @@ import pytest
 
 from mu_addon.errors import ConvergenceError
 from mu_addon.evidence.diagnosis import diagnose
-from mu_addon.evidence.effect import Parameter
+from mu_addon.evidence.effect import Effect, Parameter
 from mu_addon.evidence.simulator import Composite
-from tests.evidence.stand_ins import Moduli, made
+from tests.evidence.bench import experiment
 
 STRAIN = np.linspace(0.0, 0.1, 24)
+
+
+class Moduli:
+    """Compressed lattices of several scales: one modulus, times what brings a length, a time or a force."""
+
+    nuisances = (Parameter("modulus_kPa", "kPa", 1.0, 1000.0, 20.0, (20.0,), "resin and lattice"),)
+    effects = tuple(
+        Effect(name, (Parameter(p, unit, 0.0, high, 0.0, (start,), "stand-in"),), ("lattice_compression",))
+        for name, p, unit, high, start in (
+            ("overcure", "offset_mm", "mm", 1.0, 0.1),
+            ("skin_cure", "depth_share", "", 5.0, 0.3),
+            ("frame_compliance", "share", "", 5.0, 0.3),
+            ("seating", "gap_strain", "", 0.01, 0.001),
+            ("anisotropy", "share", "", 1.0, 0.1),
+        )
+    )
+
+    def channels(self, experiment):
+        return ("stress_kPa",)
+
+    def predict(self, experiment, values):
+        s = experiment.scale
+        modulus = values.get("modulus_kPa", 20.0)
+        # Bending struts: to the fourth power of their diameter, 1.5 mm at scale 1.
+        modulus *= (1.0 + values.get("overcure.offset_mm", 0.0) / (1.5 * s)) ** 4
+        modulus *= 1.0 + values.get("skin_cure.depth_share", 0.0) / s
+        modulus /= 1.0 + values.get("frame_compliance.share", 0.0) * s
+        modulus *= 1.0 + values.get("anisotropy.share", 0.0) * (experiment.axis == "z")
+        gap = values.get("seating.gap_strain", 0.0)
+        return modulus * np.maximum(experiment["strain"] - gap, 0.0)[None]
 
 
 class Buckling(Moduli):
@@ -32,9 +62,9 @@ def blocks(**hidden):
     found = []
     for scale in (0.75, 1.0, 1.5, 2.0):
         columns = {"time_s": 400.0 * STRAIN, "strain": STRAIN}
-        stress = Moduli().predict(made("", "lattice_compression", columns, scale=scale), values)[0]
-        columns["stress_kPa"] = stress + 0.002 * rng.normal(size=len(STRAIN))
-        found.append(made(f"{scale:g}x", "lattice_compression", columns, scale=scale))
+        e = experiment("lattice_compression", columns, f"{scale:g}x", scale=scale)
+        stress = Moduli().predict(e, values)[0] + 0.002 * rng.normal(size=len(STRAIN))
+        found.append(attrs.evolve(e, columns=columns | {"stress_kPa": stress}))
     return found
 
 

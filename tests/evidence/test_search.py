@@ -18,7 +18,8 @@ from mu_addon.evidence.residuals import dependence_table, strict_table, structur
 from mu_addon.evidence.search import one_more, reselected, select
 from mu_addon.evidence.sensitivity import SEEN, best_seen, sensitivities
 from mu_addon.evidence.simulator import Composite
-from tests.evidence import analytic, stand_ins
+from tests.evidence import analytic
+from tests.evidence.bench import experiment
 
 RUBBING = {"rate_independent_hysteresis.share": 0.25, "rate_independent_hysteresis.threshold_kPa": 3.0}
 HEAVY = {"gravity.density_kg_m3": 150.0}
@@ -174,11 +175,11 @@ def both_kinds():
     made = analytic.measured(np.random.default_rng(0), RUBBING, dt=0.4, count=3)
     mass = np.arange(0.0, 60.0, 10.0)
     sag = 0.4 * mass + np.random.default_rng(1).normal(0.0, 0.05, len(mass))
-    load = stand_ins.made("load", "beam_deadweight", {"added_mass_g": mass, "tip_deflection_mm": sag})
+    load = experiment("beam_deadweight", {"added_mass_g": mass, "tip_deflection_mm": sag}, "load")
     held = [attrs.evolve(e, name=f"{e.name}, later", role="held_out") for e in (made[0], load)]
     simulators = {
         "unit_pressure": UnitPressure([analytic.response()], made),
-        "beam_deadweight": stand_ins.DeadLoad(),
+        "beam_deadweight": analytic.DeadLoad(),
     }
     model = Composite(simulators)
     data = record([*made, load], model)

@@ -12,10 +12,11 @@ from mu_addon.evidence.effect import Effect, Parameter
 from mu_addon.evidence.extended import ExtendedModel, Fitted, extended_model, load_model, stacked
 from mu_addon.evidence.fit import Fitter
 from mu_addon.evidence.prediction.unit_pressure import UnitPressure
-from mu_addon.evidence.record import KNOWN, record
+from mu_addon.evidence.record import record
 from mu_addon.evidence.sensitivity import best_seen, sensitivities, similarity
 from mu_addon.evidence.simulator import Composite
-from tests.evidence import analytic, stand_ins
+from tests.evidence import analytic
+from tests.evidence.bench import experiment
 
 BASE = {"modulus_factor": 1.05}
 
@@ -121,10 +122,10 @@ def test_a_gain_of_the_gauge_is_refused_until_a_dead_load_is_added():
     rng = np.random.default_rng(0)
     sag = 0.4 * mass / BASE["modulus_factor"] + rng.normal(0.0, 0.05, len(mass))
     loads = [
-        stand_ins.made(
-            f"dead load {k}",
+        experiment(
             "beam_deadweight",
             {"added_mass_g": mass, "tip_deflection_mm": sag + rng.normal(0.0, 0.05, len(mass))},
+            f"dead load {k}",
         )
         for k in range(2)
     ]
@@ -132,7 +133,7 @@ def test_a_gain_of_the_gauge_is_refused_until_a_dead_load_is_added():
     both_ways = Composite(
         {
             "unit_pressure": UnitPressure([analytic.response()], both),
-            "beam_deadweight": stand_ins.DeadLoad(),
+            "beam_deadweight": analytic.DeadLoad(),
         }
     )
     found = diagnose(both, both_ways)
@@ -229,39 +230,13 @@ def test_signatures_that_nuisances_absorb_are_found_by_projection():
     assert set(alike) == {"clock_offset", "viscoelasticity"}
 
 
-def test_three_moduli_reject_a_constant_and_leave_the_cause_open():
-    made = stand_ins.three_moduli()
-    model = Composite({"lattice_compression": stand_ins.Moduli()})
-    data = record(made, model)
-    assert data.groups == (KNOWN,)
-    assert len(data) == 3
-    found = diagnose(made, model)
-    # The weighted mean leaves chi squared 20.3 of two degrees.
-    assert found.selection.base.chi2 == pytest.approx(20.3, abs=0.2)
-    assert found.selection.table_base[0].p_value == pytest.approx(4e-5, rel=0.2)
-    assert found.kind == "ambiguous"
-    assert {"overcure", "skin_cure", "frame_compliance"} <= found.ambiguity
-    assert "anisotropy" in found.identifiability
-    fits = {f.names[0]: f for f in found.selection.singles}
-    assert fits["overcure"].values["overcure.offset_mm"] == pytest.approx(0.182, abs=0.003)
-    assert fits["overcure"].chi2 == pytest.approx(0.08, abs=0.02)
-
-
-def test_moduli_that_agree_are_called_none():
-    found = diagnose(
-        stand_ins.three_moduli((20.1, 19.8, 20.3), (0.5, 0.5, 0.5)),
-        Composite({"lattice_compression": stand_ins.Moduli()}),
-    )
-    assert found.kind == "none"
-
-
 def test_an_effect_of_other_parameters_elsewhere_is_another_of_its_name():
     made = bench(9)
     one = analytic.simulator(made)
     effect = Effect("leak", (Parameter("loss_per_s", "1/s", 0.0, 0.2, 0.0, (0.01,)),), ("beam_deadweight",))
     gravity = Parameter("density_kg_m3", "kg/m3", 0.0, 4000.0, 0.0, (900.0,), "elastomers")
 
-    class Other(stand_ins.DeadLoad):
+    class Other(analytic.DeadLoad):
         effects = (effect, Effect("gravity", (gravity,), ("beam_deadweight",)))
 
     both = Composite({"unit_pressure": UnitPressure([analytic.response()], made), "beam_deadweight": Other()})

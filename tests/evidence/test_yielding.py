@@ -8,7 +8,6 @@ from hypothesis import given
 from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 
-from tests.blind.machines import yielded
 from tests.evidence.bench import acted
 
 NAME = "rate_independent_hysteresis"
@@ -36,16 +35,6 @@ def test_after_a_reversal_it_is_the_first_loading_twice_as_large():
     found = elastic_strain(way, VALUES)[len(UP) - 1 :]
     back = UP[-1] - way[len(UP) - 1 :]
     assert found == pytest.approx(first(UP[-1]) - 2 * first(back / 2), rel=1e-9, abs=1e-12)
-
-
-def test_it_is_what_sliding_elements_do():
-    random = np.random.default_rng(0)
-    ends = np.concatenate([[0.0], random.uniform(-0.1, 0.15, 12)])
-    way = np.concatenate([np.linspace(a, b, 30)[1:] for a, b in itertools.pairwise(ends)])
-    for size in (0.5, 5.0, 30.0):
-        values = {f"{NAME}.per_strain": size, f"{NAME}.hardening": H}
-        lost = way - elastic_strain(way, values)
-        assert lost == pytest.approx(way - yielded(way, 1 / size, H), abs=0.01 * abs(lost).max())
 
 
 def test_strain_stays_after_unloading():
