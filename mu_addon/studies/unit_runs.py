@@ -2,8 +2,8 @@
 
 A unit has a home folder. Its runs are in `runs/` there, each named by the hash of its inputs: the same inputs
 find the same folder, and other inputs never change it. A study in the home folder itself, as a command
-writes it, and its predecessor in `stale/` are listed with the others. A run's name and star are in its folder's
-`label.toml`.
+writes it, and its predecessor in `stale/` are listed with the others. A run's name and star are in its
+folder's `label.toml`.
 """
 
 from __future__ import annotations
