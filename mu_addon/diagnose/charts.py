@@ -9,13 +9,12 @@ from typing import Any
 import attrs
 import numpy as np
 
+from ..arrays import Array
 from ..evidence.effect import readable
 from ..evidence.gain_on_unseen import Errors
 from ..evidence.residuals import Dependence
 from ..report.plots import BY_LENGTH, CHOSEN, INK, QUIET, WIDTH, canvas, signed
 from .judged_data import Curve
-
-Array = np.ndarray[Any, Any]
 
 # Column against which an experiment of a kind is drawn.
 AXES = {

@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Any
 import attrs
 import numpy as np
 
+from ..arrays import Array
 from ..design.parameters import Unit
 from ..evidence.diagnosis import diagnose
 from ..evidence.drive import reading_noise
@@ -31,8 +32,6 @@ from .words import advice, sentence, to_do, warm
 
 if TYPE_CHECKING:
     from .unknown import Shaped
-
-Array = np.ndarray[Any, Any]
 
 
 @attrs.frozen(eq=False)

@@ -11,6 +11,7 @@ from typing import Any
 import attrs
 import numpy as np
 
+from ..arrays import Array
 from ..design.parameters import Unit
 from ..design.quantity import described
 from ..errors import InputError
@@ -28,8 +29,6 @@ from ..optimization.freedoms import Freedom, changed_unit, read_freedoms
 from ..reading import text_in
 from ..run.study import Tell
 from ..toml_reader import parsed_toml
-
-Array = np.ndarray[Any, Any]
 
 COUNT = described(
     "designs", 16, "units drawn within the bounds and simulated before the search goes on where they fit",

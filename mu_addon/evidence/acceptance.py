@@ -3,10 +3,10 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import Any
 
 import numpy as np
 
+from ..arrays import Array
 from .curved_reading import curved_reading
 from .effect import SLIP, STEP
 from .fit import PRIOR, Fit, Fitter
@@ -15,8 +15,6 @@ from .plausibility import at_a_bound, held_back, unabsorbed, value_at_a_bound
 from .record import KNOWN
 from .residuals import Dependence
 from .scatter import STATED, excess
-
-Array = np.ndarray[Any, Any]
 
 # An effect of which nuisances leave less than this stands in for them.
 ABSORBED = 0.02

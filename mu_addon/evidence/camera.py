@@ -8,9 +8,8 @@ from typing import Any
 import attrs
 import numpy as np
 
+from ..arrays import Array
 from ..design.parameters import Chambers
-
-Array = np.ndarray[Any, Any]
 
 ANGLE = "angle_deg"
 # Length of a unit at 1.0x, from base to tip.

@@ -9,11 +9,10 @@ from typing import Any
 import attrs
 import numpy as np
 
+from ..arrays import Array
 from ..measured import Experiment
 from ..measured.folder import ATMOSPHERE_kPa
 from .lags import lag_weights
-
-Array = np.ndarray[Any, Any]
 
 # The column of a room's temperature, where it was logged.
 ROOM = "room_C"

@@ -3,14 +3,12 @@
 from __future__ import annotations
 
 import math
-from typing import Any
 
 import numpy as np
 
+from ..arrays import Array
 from .fit import Fit, Fitter
 from .record import KNOWN
-
-Array = np.ndarray[Any, Any]
 
 # Gauss-Newton steps of the nuisances beside a curved reading; the last one changes almost nothing.
 STEPS = 4

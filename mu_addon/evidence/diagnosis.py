@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Mapping, Sequence
-from typing import Any
 
 import attrs
 import numpy as np
@@ -49,7 +48,6 @@ from .simulator import Composite
 from .thinning import thinned
 from .verdict import Verdict, identifiability, nearest, unlikely, verdict_kind
 
-Array = np.ndarray[Any, Any]
 Progress = Callable[[str], None]
 
 # Effects that may belong to one specimen, or differ among them, if no common one explains the data.

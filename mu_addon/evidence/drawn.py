@@ -9,11 +9,10 @@ from typing import Any
 import attrs
 import numpy as np
 
+from ..arrays import Array
 from ..design.parameters import Unit
 from ..errors import InputError
 from .effect import Parameter
-
-Array = np.ndarray[Any, Any]
 
 # More than parameters by so many: a plane has a constant, and one design left out tells its error.
 SPARE = 2

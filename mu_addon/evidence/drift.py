@@ -6,15 +6,13 @@ Relaxation is a rival of every drift: `evidence.rivals` fits both and compares t
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
-from typing import Any
 
 import attrs
 import numpy as np
 
+from ..arrays import Array
 from .effects.declaration import Action, Data, Law
 from .parameter import Parameter
-
-Array = np.ndarray[Any, Any]
 
 # Times of a law's course in s, and where fits of it begin, as shares of the longest record.
 SHORTEST_s, LONGEST_s, NULL_s = 0.5, 1e4, 30.0

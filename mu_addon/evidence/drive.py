@@ -7,17 +7,15 @@ as friction, a lag or a clock offset, over the right model.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import Any
 
 import attrs
 import numpy as np
 
+from ..arrays import Array
 from ..measured import Experiment
 from .readings import STAYS, between_steps, divided, dwell
 from .record import DRIVES
 from .simulator import Composite
-
-Array = np.ndarray[Any, Any]
 
 # Half-widths of windows, in samples.
 WIDTHS = (1, 2, 4, 8, 16, 32, 64)

@@ -4,19 +4,17 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
-from typing import Any
 
 import attrs
 import numpy as np
 
+from ..arrays import Array
 from ..errors import MuError
 from .effect import Effect, Parameter
 from .noise import Source, Whitening, estimate
 from .record import Record
 from .scatter import bounded
 from .simulator import Composite
-
-Array = np.ndarray[Any, Any]
 
 ITERATIONS = 25
 # Gain of chi squared below which a fit ends, at least; or share of its excess over the noise.

@@ -9,12 +9,11 @@ from typing import Any
 import attrs
 import numpy as np
 
+from ..arrays import Array
 from ..errors import MuError
 from ..measured import Experiment
 from .fit import Fit, Fitter
 from .record import KNOWN, Record, record
-
-Array = np.ndarray[Any, Any]
 
 RESAMPLES = 400
 

@@ -6,11 +6,9 @@ that relaxes) depends on its true course, not on the chord from sample to sample
 
 from __future__ import annotations
 
-from typing import Any
-
 import numpy as np
 
-Array = np.ndarray[Any, Any]
+from ..arrays import Array
 
 # Slopes on one side of a corner are alike to this share of what the slope changes by there.
 STRAIGHT = 0.05

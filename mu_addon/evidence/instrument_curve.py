@@ -2,13 +2,10 @@
 
 from __future__ import annotations
 
-from typing import Any
-
 import numpy as np
 
+from ..arrays import Array
 from .parameter import Parameter
-
-Array = np.ndarray[Any, Any]
 
 
 def bow(source: str) -> Parameter:

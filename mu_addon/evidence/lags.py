@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-Array = np.ndarray[Any, Any]
+from ..arrays import Array
 
 # Smaller reversals of a pressure in kPa are noise of the gauge.
 DEADBAND_kPa = 0.2

@@ -3,19 +3,17 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import Any
 
 import attrs
 import numpy as np
 
+from ..arrays import Array
 from ..errors import InputError
 from ..fem.embedding import Probe
 from ..fem.kinematics import probe
 from ..measured import Experiment
 from ..measured.pose import at_rest
 from ..meshing.mesh import AXES, Mesh, boundary_faces
-
-Array = np.ndarray[Any, Any]
 
 
 @attrs.frozen(eq=False)

@@ -8,6 +8,7 @@ from typing import Any
 import attrs
 import numpy as np
 
+from ..arrays import Array
 from ..errors import MuError
 from ..measured import Experiment
 from .effect import BATCH, GEOMETRY, THICKNESS
@@ -17,8 +18,6 @@ from .found_causes import Selection, effects_in
 from .noise import Whitening
 from .record import record
 from .sensitivity import Sensitivity
-
-Array = np.ndarray[Any, Any]
 
 # Additional distance of a load cell from the tip.
 FURTHER_mm = 2.0

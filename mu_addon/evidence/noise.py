@@ -10,11 +10,10 @@ from typing import Any
 import attrs
 import numpy as np
 
+from ..arrays import Array
 from ..measured import Experiment
 from .readings import STAYS
 from .record import KNOWN, Record, Series
-
-Array = np.ndarray[Any, Any]
 
 
 @attrs.frozen

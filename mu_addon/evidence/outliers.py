@@ -3,19 +3,17 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import Any
 
 import attrs
 import numpy as np
 from numpy.lib.stride_tricks import sliding_window_view
 
+from ..arrays import Array
 from ..measured import Experiment
 from .fit import Fit, Fitter
 from .readings import ALIKE, MOST_WRONG, TIMES_MORE
 from .record import KNOWN, Series
 from .residuals import FALSE_ALARM
-
-Array = np.ndarray[Any, Any]
 
 NAME = "outlier"
 

@@ -4,11 +4,11 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Mapping, Sequence
-from typing import Any
 
 import attrs
 import numpy as np
 
+from ..arrays import Array
 from ..measured import Experiment
 from .effect import OF, Effect, Parameter
 from .effects import DECLARED
@@ -16,8 +16,6 @@ from .effects.declaration import ALL, BENCH
 from .fit import Fit, Fitter
 from .owned import of_specimens, scaled_by
 from .spanned import basis
-
-Array = np.ndarray[Any, Any]
 
 # Least number of owners for an estimate of the spread.
 FEWEST = 3

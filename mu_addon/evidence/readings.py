@@ -4,18 +4,16 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
-from typing import Any
 
 import attrs
 import numpy as np
 
+from ..arrays import Array
 from ..errors import MuError
 from ..measured import Experiment
 from ..measured.kinds import quantity_of
 from .simulator import Composite
 from .unclocked import IN_A_ROW, Points, in_a_run, lone, points
-
-Array = np.ndarray[Any, Any]
 
 # Largest number of decimals of a gauge; a number with more was not read from a display.
 DIGITS = 9

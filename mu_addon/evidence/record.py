@@ -10,12 +10,11 @@ from typing import Any
 import attrs
 import numpy as np
 
+from ..arrays import Array
 from ..errors import InputError, MuError
 from ..measured import Experiment
 from .readings import display_steps, quantum, stretch
 from .simulator import Composite
-
-Array = np.ndarray[Any, Any]
 
 # Blocks a record may have; longer records are averaged over whole blocks, and their predictions alike.
 BLOCKS = 600

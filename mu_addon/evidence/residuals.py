@@ -11,6 +11,7 @@ from typing import Any
 import attrs
 import numpy as np
 
+from ..arrays import Array
 from ..design.parameters import Chambers
 from ..errors import InputError
 from ..measured import Experiment
@@ -22,8 +23,6 @@ from .prediction.unit_pressure import KIND as UNIT
 from .record import KNOWN, Record, Series, repeats
 from .ringing import modes, ringing
 from .spanned import basis, unit
-
-Array = np.ndarray[Any, Any]
 
 # Share of clean data sets in which any structure may be reported.
 FALSE_ALARM = 0.003

@@ -4,11 +4,10 @@ from __future__ import annotations
 
 import math
 from functools import lru_cache
-from typing import Any
 
 import numpy as np
 
-Array = np.ndarray[Any, Any]
+from ..arrays import Array
 
 # Shares of the critical damping, each for those within a factor of 1.6 of it.
 DAMPINGS = (0.03, 0.08, 0.2)

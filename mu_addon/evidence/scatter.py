@@ -5,17 +5,15 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping, Sequence
 from itertools import pairwise
-from typing import Any
 
 import attrs
 import numpy as np
 
+from ..arrays import Array
 from .drive import FEWEST, reading_noise
 from .noise import Source
 from .readings import divided
 from .record import DRIVES, KNOWN, Record, Series, repeats
-
-Array = np.ndarray[Any, Any]
 
 # Noise may be this many times the scatter of readings: slow noise of an instrument is some two to three times
 # its fast part (3.1 at most in 42 clean sets of a second code).

@@ -4,19 +4,17 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
-from typing import Any
 
 import attrs
 import numpy as np
 
+from ..arrays import Array
 from ..errors import MuError
 from .effect import Effect, Parameter
 from .fit import Fitter
 from .record import Record
 from .simulator import Composite
 from .spanned import unit
-
-Array = np.ndarray[Any, Any]
 
 # Delta chi squared of 16: detected in nearly every data set, corrected for a library of some 25 effects.
 SEEN = 4.0

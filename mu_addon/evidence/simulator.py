@@ -10,6 +10,7 @@ from typing import Any, Protocol
 import attrs
 import numpy as np
 
+from ..arrays import Array
 from ..design.parameters import Unit, load_preset
 from ..design.settings import PRESET
 from ..errors import InputError
@@ -18,8 +19,6 @@ from ..measured.kinds import OF_A_UNIT
 from .effect import OF, Effect, Parameter
 from .effects import MODULI, Acting, laws_of
 from .effects.declaration import Setting
-
-Array = np.ndarray[Any, Any]
 
 # Part of the name of every modulus among the nuisances.
 MODULUS = "modulus"

@@ -2,13 +2,10 @@
 
 from __future__ import annotations
 
-from typing import Any
-
 import numpy as np
 
+from ..arrays import Array
 from ..errors import InputError
-
-Array = np.ndarray[Any, Any]
 
 # What the stretch is brought to beside itself in the neo-Hookean stress x - x^-m.
 _ACROSS = {"uniaxial": 2.0, "equibiaxial": 5.0, "pure_shear": 3.0}

@@ -3,16 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import Any
 
 import attrs
 import numpy as np
 
+from ..arrays import Array
 from ..measured import Experiment
 from .readings import STAYS, dwell
 from .simulator import Composite
-
-Array = np.ndarray[Any, Any]
 
 # Most rows of a record: thirty for each block of readings in a fit (`record.BLOCKS`).
 MOST = 20_000

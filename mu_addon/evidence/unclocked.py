@@ -10,9 +10,8 @@ import attrs
 import numpy as np
 from numpy.lib.stride_tricks import sliding_window_view
 
+from ..arrays import Array
 from ..measured import Experiment
-
-Array = np.ndarray[Any, Any]
 
 TURN = "orientation_deg"
 DRIVES = ("pressure_kPa", "strain", "added_mass_g", TURN)

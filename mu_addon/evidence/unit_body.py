@@ -5,11 +5,12 @@ from __future__ import annotations
 from collections.abc import Callable
 from functools import lru_cache
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import attrs
 import numpy as np
 
+from ..arrays import Array
 from ..design.parameters import Unit
 from ..errors import InputError
 from ..fem.newton_settings import (
@@ -27,7 +28,6 @@ if TYPE_CHECKING:
     from ..fem.model import Model
     from ..meshing.mesh import Mesh
 
-Array = np.ndarray[Any, Any]
 
 WALL, HELD = "wall", "held"
 # A size whose path ends before the last pressure is useless: it need not be followed to its end.

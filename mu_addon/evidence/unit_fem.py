@@ -7,11 +7,11 @@ import warnings
 from collections.abc import Callable, Collection, Iterator, Sequence
 from functools import cached_property, partial
 from pathlib import Path
-from typing import Any
 
 import attrs
 import numpy as np
 
+from ..arrays import Array
 from ..body.printed_mesh import mesh_printed
 from ..design.parameters import Unit
 from ..errors import ConvergenceError, InputError
@@ -32,7 +32,6 @@ from .prediction.unit_pressure import KIND, UnitResponse, Variant
 from .unit_body import HELD, WALL, Body
 from .unit_run import Result, Run, run
 
-Array = np.ndarray[Any, Any]
 Progress = Callable[[str, float], None]
 
 ANGLE, VOLUME, FORCE = "angle_deg", "volume_mm3", "force_N"

@@ -11,6 +11,7 @@ from typing import Any
 import attrs
 import numpy as np
 
+from ..arrays import Array
 from ..design.quantity import in_MPa
 from ..errors import ConvergenceError, InputError, MeshingError
 from ..fem.bending_angle import TipSection
@@ -25,8 +26,6 @@ from .effects import ON_UNITS
 from .effects.contact import with_flat_obstacle
 from .markers import material_points
 from .unit_body import Body, UnitEffect
-
-Array = np.ndarray[Any, Any]
 
 # Part of every key: raise it when a change of the code changes what is computed.
 REVISION = 3

@@ -8,7 +8,6 @@ from types import MappingProxyType
 from typing import Any
 
 import attrs
-import numpy as np
 
 from ..measured import Experiment
 from .effect import Effect, Parameter
@@ -23,8 +22,6 @@ from .noise import Source
 from .plausibility import at_a_bound
 from .record import Record
 from .sensitivity import ABSORBED, SEEN, Sensitivity, best_seen
-
-Array = np.ndarray[Any, Any]
 
 KINDS = ("none", "named", "ambiguous", "unidentifiable", "unexplained")
 # Of what the best effect takes, what another must take for the verdict to turn on it, and at a bound.

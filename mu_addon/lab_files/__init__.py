@@ -12,12 +12,8 @@ from typing import TYPE_CHECKING
 from ..lazy import public_face
 
 if TYPE_CHECKING:
-    from .proposal import Proposal as Proposal
-    from .proposal import Question as Question
-    from .tracked_table import PROJECTS as PROJECTS
-    from .tracked_table import SUFFIXES as SUFFIXES
-    from .tracked_table import read_pixels as read_pixels
-    from .understood import Understood as Understood
-    from .understood import understand as understand
+    from .proposal import Proposal, Question
+    from .tracked_table import PROJECTS, SUFFIXES, read_pixels
+    from .understood import Understood, understand
 else:
     __getattr__, __dir__, __all__ = public_face(__name__)

@@ -14,10 +14,11 @@ from itertools import zip_longest
 import attrs
 import numpy as np
 
+from ..arrays import Array
 from ..errors import InputError
 from ..table_cells.clock import clock, is_clock
 from ..table_cells.dialect import BRACKET, Row, split
-from ..table_cells.notation import Array, is_like_number, judged, unit_behind
+from ..table_cells.notation import is_like_number, judged, unit_behind
 from .cells import ReadColumn, in_one_notation, read_column
 from .columns import Column, column, is_unit, plain, shown
 from .sheet import Sheet

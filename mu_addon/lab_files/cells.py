@@ -8,9 +8,10 @@ from collections.abc import Mapping, Sequence
 import attrs
 import numpy as np
 
+from ..arrays import Array
 from ..errors import InputError
 from ..table_cells.clock import clock, is_clock
-from ..table_cells.notation import DECIMALS, OTHER, Array, Numbers, judged, number, unit_behind, with_units
+from ..table_cells.notation import DECIMALS, OTHER, Numbers, judged, number, unit_behind, with_units
 from .columns import unit_of
 from .sheet import Sheet
 

@@ -8,8 +8,8 @@ from collections.abc import Mapping
 import attrs
 import numpy as np
 
+from ..arrays import Array
 from ..measured.kinds import KINDS, named
-from ..table_cells.notation import Array
 from .columns import READ_IN, plain, unit_of
 from .proposal import NoExperiment, Proposal
 from .quantities import ask_column, may_hold

@@ -11,8 +11,8 @@ from typing import Any
 import attrs
 import numpy as np
 
+from ..arrays import Array
 from ..errors import InputError
-from ..table_cells.notation import Array
 from .blocks import Block, Unread
 from .columns import Column, shown
 

@@ -7,7 +7,7 @@ from collections.abc import Mapping
 
 import numpy as np
 
-from ..table_cells.notation import Array
+from ..arrays import Array
 from .decisions import kept_by
 from .kind import LOADED
 from .proposal import Proposal

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import numpy as np
 
+from ..arrays import Array
 from ..errors import InputError
 from ..measured.kinds import KINDS
-from ..table_cells.notation import Array
 from .proposal import Proposal
 
 # Seconds or days since 1970 or 1900 are no time of a test.

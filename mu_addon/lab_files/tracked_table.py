@@ -11,11 +11,11 @@ import csv
 import re
 from collections.abc import Mapping, Sequence
 from pathlib import Path
-from typing import Any
 
 import attrs
 import numpy as np
 
+from ..arrays import Array
 from ..errors import InputError
 from ..measured.table import Remarks
 from ..measured.video import Tracks
@@ -24,7 +24,6 @@ from ..table_cells.notation import is_like_number
 from ..table_cells.own_tables import own_lines, own_rows, own_text
 from .columns import column, unit_of
 
-Array = np.ndarray[Any, Any]
 Line = tuple[int, str]
 Cells = tuple[int, list[str]]
 

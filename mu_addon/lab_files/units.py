@@ -7,8 +7,8 @@ import re
 import attrs
 import numpy as np
 
+from ..arrays import Array
 from ..errors import InputError
-from ..table_cells.notation import Array
 from .columns import READ_IN, Column, known_in, plain
 from .proposal import Proposal
 

@@ -14,6 +14,7 @@ from typing import Any
 import attrs
 import numpy as np
 
+from ..arrays import Array
 from ..errors import InputError
 from ..reading import text_in
 from ..table_cells.own_tables import own_text
@@ -24,8 +25,6 @@ from .pose import AT_REST, SAMPLES
 from .table import Remark, Remarks, read_table
 from .video import Motion, Pair, Tracks, View, motion, resting
 from .writing import Entry, csv_text, file_stem
-
-Array = np.ndarray[Any, Any]
 
 KIND = "unit_pressure"
 OF_EXPERIMENT = tuple(k for k in COMMON + KINDS[KIND].may_have_keys if k not in ("kind", "file"))

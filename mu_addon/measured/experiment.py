@@ -11,9 +11,8 @@ from typing import Any
 import attrs
 import numpy as np
 
+from ..arrays import Array
 from ..run.stored import content
-
-Array = np.ndarray[Any, Any]
 
 
 def _read_only(columns: Mapping[str, Any]) -> Mapping[str, Array]:

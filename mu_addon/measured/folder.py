@@ -11,11 +11,12 @@ from typing import Any
 import attrs
 import numpy as np
 
+from ..arrays import Array
 from ..errors import InputError
 from ..reading import file_bytes, text_in
 from ..table_cells.own_tables import own_text
 from ..toml_reader import TomlTable, read_toml
-from .experiment import Array, Experiment
+from .experiment import Experiment
 from .kinds import ACCURACIES, AXES, BETWEEN, CHOICES, KINDS, PRESSURES, ROLES, UP_TO, Kind
 from .table import Remark, Remarks, read_table
 

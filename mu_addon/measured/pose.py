@@ -4,15 +4,14 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from typing import Any
 
 import numpy as np
 
+from ..arrays import Array
 from ..errors import InputError
 from .experiment import Experiment
 from .kinds import AXES, markers
 
-Array = np.ndarray[Any, Any]
 Direction = tuple[float, float, float]
 X: Direction = (1.0, 0.0, 0.0)
 

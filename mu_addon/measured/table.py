@@ -8,17 +8,15 @@ import math
 import re
 from collections.abc import Sequence
 from pathlib import Path
-from typing import Any
 
 import attrs
 import numpy as np
 
+from ..arrays import Array
 from ..errors import InputError, did_you_mean
 from ..reading import require_rows
 from ..table_cells.own_tables import own_lines, own_rows
 from .kinds import STEADY, Kind, markers, may_be_missing, named, quantity_of, units_of
-
-Array = np.ndarray[Any, Any]
 
 # Of a reading in any unit that is read; loggers write the largest number they have where there is none.
 LARGEST = 1e15

@@ -8,15 +8,13 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
-from typing import Any
 
 import attrs
 import numpy as np
 
+from ..arrays import Array
 from ..errors import InputError
 from .table import Remark, Remarks
-
-Array = np.ndarray[Any, Any]
 
 CAMERAS = ("+x", "-x")
 # The distance of two markers on one rigid part may vary by this share; more, and one of them has slipped.

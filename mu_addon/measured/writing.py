@@ -9,19 +9,17 @@ import tempfile
 from collections.abc import Callable, Mapping, Sequence
 from functools import partial
 from pathlib import Path
-from typing import Any
 
 import attrs
 import numpy as np
 
+from ..arrays import Array
 from ..errors import InputError
 from ..files import write_text
 from ..reading import file_text
 from ..run.parts import File
 from .folder import FILE, read_folder
 from .table import Remark
-
-Array = np.ndarray[Any, Any]
 
 
 def file_stem(name: str) -> str:

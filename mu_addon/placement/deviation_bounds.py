@@ -6,12 +6,10 @@ divided by the number of all, is therefore never above J_hat.
 
 from __future__ import annotations
 
-from typing import Any
-
 import attrs
 import numpy as np
 
-Array = np.ndarray[Any, Any]
+from ..arrays import Array
 
 # Of J_hat: sums in another order differ by less.
 ROUNDING = 1e-9

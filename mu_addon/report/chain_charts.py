@@ -3,10 +3,10 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import Any
 
 import numpy as np
 
+from ..arrays import Array
 from ..chain import ChainState, Shape
 from ..meshing.mesh import LATTICE, MEMBRANE
 from . import plots
@@ -14,8 +14,6 @@ from .render import Part, framed, png, render
 from .results import Picture
 from .shapes import ball
 from .unit_pictures import LATTICE_COLOR, MEMBRANE_COLOR, WHITE, region_skin
-
-Array = np.ndarray[Any, Any]
 
 _TARGET_COLOR = (0.835, 0.369, 0.0)
 # The base is above where the chain hangs, and stands where it is turned round.

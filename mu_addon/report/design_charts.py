@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from ..arrays import Array
 from ..design.body import Body, covering, envelope, section
 from ..design.dimensions import Dimensions
 from ..design.lattice import lattice_of
@@ -19,7 +20,6 @@ from .plots import BY_LENGTH, CHOSEN, INK, QUIET, canvas, styled
 if TYPE_CHECKING:
     from ..optimization import Design, Found
 
-Array = np.ndarray[Any, Any]
 
 ALONG = 6
 STATIONS = np.linspace(0.0, 1.0, 7)

@@ -3,10 +3,10 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from typing import Any
 
 import numpy as np
 
+from ..arrays import Array
 from ..design.gripper import ROOT, Gripper, GripperSolid
 from ..grasp import Grasp
 from ..meshing.mesh import Mesh
@@ -15,8 +15,6 @@ from .render import Cut, Part, framed, png, render
 from .results import Picture
 from .shapes import box
 from .unit_pictures import COLORS, WHITE, skins_of, unit_parts
-
-Array = np.ndarray[Any, Any]
 
 PLATE_COLOR = (0.50, 0.55, 0.60)
 CUBE_COLOR = (0.0, 0.45, 0.70)  # plots.BY_LENGTH[0]

@@ -12,10 +12,10 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 
+from ..arrays import Array
 from ..design.gripper import Gripper
 from ..design.quantity import in_MPa
 from ..errors import InputError
@@ -28,8 +28,6 @@ from ..meshing.mesh import Mesh
 from .motion_files import read_motion, write_model_a
 from .pc2 import write_pc2
 from .vtk import write_trajectory
-
-Array = np.ndarray[Any, Any]
 
 SIDES = ("left", "right")
 CUT = "-cut"

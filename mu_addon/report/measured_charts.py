@@ -3,13 +3,9 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from typing import Any
 
-import numpy as np
-
+from ..arrays import Array
 from . import plots
-
-Array = np.ndarray[Any, Any]
 
 # Axes of the chart, the first pair that is present.
 _PAIRS = (

@@ -18,11 +18,12 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import attrs
 import numpy as np
 
+from ..arrays import Array
 from ..design.quantity import in_kPa
 from ..errors import InputError
 from ..fem.embedding import Embedding, embed
@@ -35,7 +36,6 @@ if TYPE_CHECKING:
     from ..fem.materials import Materials
     from ..fem.trajectory import Trajectory
 
-Array = np.ndarray[Any, Any]
 
 FOLDER = "motion"
 MODEL_A = "model_a"

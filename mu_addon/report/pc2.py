@@ -4,14 +4,12 @@ from __future__ import annotations
 
 import struct
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 
+from ..arrays import Array
 from ..errors import InputError
 from ..files import write_bytes
-
-Array = np.ndarray[Any, Any]
 
 _HEADER = "<12siiffi"
 _MAGIC = b"POINTCACHE2\0"

@@ -5,16 +5,14 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from contextlib import suppress
 from pathlib import Path
-from typing import Any
 from xml.sax.saxutils import quoteattr
 
 import numpy as np
 
+from ..arrays import Array
 from ..fem.state import State
 from ..files import make_folder, replacing, write_text
 from ..meshing.mesh import Mesh
-
-Array = np.ndarray[Any, Any]
 
 _CELL = {4: "tetra", 10: "tetra10"}
 

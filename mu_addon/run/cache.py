@@ -9,9 +9,8 @@ from typing import Any
 
 import numpy as np
 
+from ..arrays import Array
 from ..files import output_error, read_npz, write_npz
-
-Array = np.ndarray[Any, Any]
 
 # Part of every key: raise it when a change of the code changes what is computed.
 REVISION = 1

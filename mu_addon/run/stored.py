@@ -13,7 +13,8 @@ from typing import Any, Union
 import attrs
 import numpy as np
 
-Array = np.ndarray[Any, Any]
+from ..arrays import Array
+
 Arrays = dict[str, Array]
 
 # Ends the name of the array that holds a tuple's length or a table's names.

@@ -4,11 +4,11 @@ from __future__ import annotations
 
 from collections.abc import Generator, Mapping, Sequence
 from copy import deepcopy
-from typing import Any
 
 import attrs
 import numpy as np
 
+from ..arrays import Array as Array
 from ..body.candidates import PrintedWaveguides
 from ..design.anchors import anchor_points
 from ..design.quantity import in_MPa
@@ -24,8 +24,6 @@ from ..placement.deviation import centreline
 from ..placement.deviation_bounds import Contest, first_and_rest, lower_bounds
 from ..placement.sampling import between, relative_error, solution_order
 from .mechanics import Mechanics, Samples
-
-Array = np.ndarray[Any, Any]
 
 # Pressures between those solved are interpolated where that changes no path's mean deviation by more.
 SAMPLING_ERROR = 0.02

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from ..arrays import Array
 from ..errors import InputError
 from ..fem.obstacle import Obstacle, ObstacleContact
 from ..fem.rigid_surface import Surface
@@ -18,7 +19,6 @@ if TYPE_CHECKING:
     from ..design.rigid_body import RigidBody
     from ..meshing.mesh import Mesh
 
-Array = np.ndarray[Any, Any]
 
 # Error of the gap at 1.0x at the expected contact pressure, and slip at which friction slides.
 DEPTH_mm = 0.05

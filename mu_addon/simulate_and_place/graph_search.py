@@ -4,11 +4,11 @@ from __future__ import annotations
 
 import itertools
 from collections.abc import Sequence
-from typing import Any
 
 import attrs
 import numpy as np
 
+from ..arrays import Array
 from ..body.response import bar_response
 from ..body.waveguide import bar_of
 from ..design.anchors import anchor_points
@@ -32,8 +32,6 @@ from ..placement.sensitivity_map import (
 )
 from ..report.results import LatticePath
 from .mechanics import Mechanics
-
-Array = np.ndarray[Any, Any]
 
 # Beyond this their list alone takes gigabytes.
 MOST_PATHS = 200_000

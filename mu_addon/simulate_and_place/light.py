@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any
 import attrs
 import numpy as np
 
+from ..arrays import Array
 from ..design.anchors import anchor_points, windows
 from ..design.waveguide import waveguide
 from ..errors import InputError
@@ -32,7 +33,6 @@ if TYPE_CHECKING:
     from ..fem.trajectory import Trajectory
     from .ranking import Ranking
 
-Array = np.ndarray[Any, Any]
 
 TABLE = "signals.csv"
 # Noise of a reading, as a share of the light: a photodiode and a 10 bit converter.

@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 from functools import cached_property
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import attrs
 import numpy as np
 
+from ..arrays import Array
 from ..design.body import Body
 from ..design.parameters import Unit, Waveguide
 from ..design.rigid_body import RigidBody, mirrored, to_obj
@@ -29,8 +30,6 @@ if TYPE_CHECKING:
     from ..fem.materials import Materials
     from ..fem.model import Model
     from ..meshing.mesh import Mesh
-
-Array = np.ndarray[Any, Any]
 
 
 @attrs.frozen(eq=False)

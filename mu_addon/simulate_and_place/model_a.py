@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any
 import attrs
 import numpy as np
 
+from ..arrays import Array
 from ..errors import ConvergenceError, MuError
 from ..fem.equilibrium import Equilibrium
 from ..fem.state import State
@@ -19,8 +20,6 @@ from .mechanics import Mechanics, Samples
 
 if TYPE_CHECKING:
     from ..fem.model import Model
-
-Array = np.ndarray[Any, Any]
 
 
 @attrs.frozen(eq=False)

@@ -5,12 +5,13 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping, Sequence
 from functools import lru_cache
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 from weakref import WeakKeyDictionary
 
 import attrs
 import numpy as np
 
+from ..arrays import Array
 from ..body.printed_mesh import mesh_printed
 from ..design.body import Body
 from ..design.parameters import Unit
@@ -27,8 +28,6 @@ from .motion_tables import Reached, Row, SelfContact, self_contact_of, stretch_r
 
 if TYPE_CHECKING:
     from ..fem.equilibrium import Equilibrium
-
-Array = np.ndarray[Any, Any]
 
 
 def mesh_of(

@@ -4,11 +4,11 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import attrs
-import numpy as np
 
+from ..arrays import Array
 from ..body.joint_stretch import joint_stretch
 from ..design.body import covering
 from ..fem.bending_angle import TipSection
@@ -22,7 +22,6 @@ if TYPE_CHECKING:
     from ..fem.model import Model
     from .mechanics import Mechanics, Samples
 
-Array = np.ndarray[Any, Any]
 Row = tuple[str, ...]
 
 

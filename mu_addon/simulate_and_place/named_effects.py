@@ -7,8 +7,8 @@ from types import MappingProxyType
 from typing import TYPE_CHECKING, Any
 
 import attrs
-import numpy as np
 
+from ..arrays import Array
 from ..errors import InputError, did_you_mean
 from ..evidence.effect import Parameter
 from ..evidence.effects import DECLARED, laws_of
@@ -24,7 +24,6 @@ if TYPE_CHECKING:
     from ..fem.model import Model
     from ..meshing.mesh import Mesh
 
-Array = np.ndarray[Any, Any]
 
 REFERENCE = Parameter("reference_kPa", "kPa", 0.01, 1e4, 1.0, (), "the largest pressure of the measured data")
 # Those with materials, in the order in which they change what the others left: the first takes the wall as

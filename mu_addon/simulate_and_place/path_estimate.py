@@ -3,10 +3,11 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 
+from ..arrays import Array
 from ..body.response import bar_response
 from ..design.anchors import anchor_points, windows
 from ..design.quantity import in_MPa
@@ -19,8 +20,6 @@ if TYPE_CHECKING:
     from ..fem.state import State
     from ..meshing.mesh import Mesh
     from .mechanics import Mechanics, Samples
-
-Array = np.ndarray[Any, Any]
 
 
 def column_graph(anchors: Array, cell: float) -> Graph:

@@ -3,18 +3,16 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from typing import Any
 
 import attrs
 import numpy as np
 
+from ..arrays import Array
 from ..fem.kinematics import MIRROR
 from ..fem.state import State
 from ..meshing.mesh import Mesh, images
 from ..report.motion_files import IMAGE, REGIONS, SurfaceFields, surface_of
 from .mechanics import Mechanics
-
-Array = np.ndarray[Any, Any]
 
 
 @attrs.frozen(eq=False)

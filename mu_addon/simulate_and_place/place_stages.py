@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any
 import attrs
 import numpy as np
 
+from ..arrays import Array
 from ..body.candidates import PrintedWaveguides
 from ..body.waveguide import bar_of
 from ..design.anchors import anchor_points, windows
@@ -49,8 +50,6 @@ from .ranking import Ranking, extremes, mesh_change_mm
 if TYPE_CHECKING:
     from ..run.study import Tell
     from ..sensing.optics import Optics
-
-Array = np.ndarray[Any, Any]
 
 
 def require_paths(unit: Unit, body: Body | None, limits: Limits | None) -> None:

@@ -7,16 +7,13 @@ Between two states displacements go straight, as the motion on the timeline does
 
 from __future__ import annotations
 
-from typing import Any
-
 import attrs
 import numpy as np
 
+from ..arrays import Array
 from ..errors import InputError
 from ..fem.bending_angle import TipSection
 from ..report.motion_files import Motion
-
-Array = np.ndarray[Any, Any]
 
 
 @attrs.frozen(eq=False)

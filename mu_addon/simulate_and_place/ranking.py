@@ -8,11 +8,10 @@ from typing import Any
 import attrs
 import numpy as np
 
+from ..arrays import Array
 from ..errors import ConvergenceError
 from ..placement.candidates import Candidate, Evaluation
 from ..placement.deviation import rank
-
-Array = np.ndarray[Any, Any]
 
 COLUMNS = [
     "path",

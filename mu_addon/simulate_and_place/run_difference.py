@@ -2,15 +2,12 @@
 
 from __future__ import annotations
 
-from typing import Any
-
 import attrs
 import numpy as np
 
+from ..arrays import Array
 from ..errors import InputError
 from ..report.motion_files import Motion, Skin
-
-Array = np.ndarray[Any, Any]
 
 FARTHEST = 0.05
 """Points farther outside the other mesh than this share of its extent are not compared."""

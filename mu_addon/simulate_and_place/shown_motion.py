@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Any
 import attrs
 import numpy as np
 
+from ..arrays import Array
 from ..design.parameters import assumed, stated
 from ..fem.bending_angle import TipSection
 from ..fem.state import State
@@ -37,8 +38,6 @@ from .named_effects import parameters_of
 if TYPE_CHECKING:
     from ..design.solid import Solid
     from ..meshing.quality import Quality
-
-Array = np.ndarray[Any, Any]
 
 
 def motion_parts(study: Any, mesh: Mesh, reached: Reached) -> Iterator[Part]:

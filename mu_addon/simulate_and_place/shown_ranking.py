@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from ..arrays import Array
 from ..fem.bending_angle import TipSection
 from ..fem.trajectory import Trajectory
 from ..files import write_npz
@@ -45,7 +46,6 @@ from .ranking import COLUMNS, Ranking
 if TYPE_CHECKING:
     from ..design.solid import Solid
 
-Array = np.ndarray[Any, Any]
 MAP = "sensitivity.vtu"
 
 

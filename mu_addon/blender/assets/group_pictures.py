@@ -8,12 +8,11 @@ from typing import Any
 import bpy
 import numpy as np
 
+from ...arrays import Array
 from ..preview import materials, nodes
 from ..results import field_colours
 from ..shared.compat import set_modifier_input
 from .surface_picture import surface_pixels
-
-Array = np.ndarray[Any, Any]
 
 
 def group_pixels(name: str, size: int) -> Array:

@@ -8,6 +8,7 @@ from typing import Any
 import bpy
 import numpy as np
 
+from ...arrays import Array
 from ...design.assets import asset_names
 from ...design.printing.printer import load_printer
 from ..preview import materials, skeletons
@@ -16,8 +17,6 @@ from ..unit.envelope import arrays_in
 from ..unit.resins import parameters as resin_parameters
 from .dropped import PRINTER, RESIN
 from .surface_picture import surface_pixels
-
-Array = np.ndarray[Any, Any]
 
 
 def names_of_all() -> set[str]:

@@ -5,11 +5,9 @@ It blocks Blender's window, and the renderer of reports would first load Warp.
 
 from __future__ import annotations
 
-from typing import Any
-
 import numpy as np
 
-Array = np.ndarray[Any, Any]
+from ...arrays import Array
 
 _TOWARDS = np.array([0.80, 0.45, 0.40])
 _LIGHT = np.array([0.75, -0.25, 0.61])

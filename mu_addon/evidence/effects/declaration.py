@@ -27,6 +27,7 @@ from typing import TYPE_CHECKING, Any
 import attrs
 import numpy as np
 
+from ...arrays import Array as Array
 from ...measured import Experiment
 from ..parameter import Parameter as Parameter
 from ..parameter import factor as factor
@@ -34,7 +35,6 @@ from ..parameter import factor as factor
 if TYPE_CHECKING:
     from ..unit_body import UnitEffect
 
-Array = np.ndarray[Any, Any]
 
 SPECIMEN, BENCH, EITHER, ALL = "specimen", "bench", "either", "all"
 """Who may have an effect alone: a specimen, an experiment or session on a bench, either; or all have it."""

@@ -3,10 +3,10 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from typing import Any
 
 import numpy as np
 
+from ...arrays import Array
 from ...errors import ConvergenceError
 from ...measured import Experiment
 from ..effect import offered
@@ -14,8 +14,6 @@ from ..effects import Acting
 from ..effects.declaration import Data, Setting
 from ..effects.gravity import G as GRAVITY
 from ..parameter import Parameter
-
-Array = np.ndarray[Any, Any]
 
 KIND = "beam_deadweight"
 # Shear coefficient of a rectangle, 10 (1 + nu)/(12 + 11 nu) at 1/2: Cowper, J. Appl. Mech. 33 (1966) 335.

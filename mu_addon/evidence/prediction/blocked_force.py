@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from typing import Any
 
 import attrs
 import numpy as np
 
+from ...arrays import Array
 from ...errors import InputError
 from ...measured import Experiment
 from ...measured.pose import down
@@ -19,8 +19,6 @@ from ..load_cell import ZERO_SHARE
 from ..parameter import Parameter
 from ..unit_body import HELD
 from .unit_pressure import UnitPressure, UnitResponse, believed, driving_kPa
-
-Array = np.ndarray[Any, Any]
 
 KIND = "blocked_force"
 FORCE = "force_N"

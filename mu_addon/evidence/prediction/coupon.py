@@ -3,10 +3,10 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from typing import Any
 
 import numpy as np
 
+from ...arrays import Array
 from ...measured import Experiment
 from ..effect import offered
 from ..effects import Acting
@@ -15,8 +15,6 @@ from ..load_cell import largest_N
 from ..parameter import Parameter
 from ..stretching import yeoh
 from .specimen import NEW, load_zeros, recorded, specimen_setting, strain_histories
-
-Array = np.ndarray[Any, Any]
 
 KIND = "coupon"
 

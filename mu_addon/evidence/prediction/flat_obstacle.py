@@ -8,9 +8,8 @@ from typing import Any
 import attrs
 import numpy as np
 
+from ...arrays import Array
 from ...errors import InputError
-
-Array = np.ndarray[Any, Any]
 
 CONTACT = "contact"
 # A wall nearer than this share of the free unit's way is not computed.

@@ -5,11 +5,12 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Mapping, Sequence
 from types import MappingProxyType
-from typing import Any, Protocol
+from typing import Protocol
 
 import attrs
 import numpy as np
 
+from ...arrays import Array
 from ...homogenize.offset_response import OffsetResponse
 from ...measured import Experiment
 from ..effect import offered
@@ -18,8 +19,6 @@ from ..effects.declaration import Data
 from ..load_cell import largest_N
 from ..parameter import Parameter
 from .specimen import NEW, recorded, specimen_setting, strain_histories
-
-Array = np.ndarray[Any, Any]
 
 KIND = "lattice_compression"
 

@@ -8,6 +8,7 @@ from typing import Any
 import attrs
 import numpy as np
 
+from ...arrays import Array
 from ...measured import Experiment
 from ...measured.folder import ATMOSPHERE_kPa
 from ..chamber import ROOM, Chamber, beginning_kPa, warmed
@@ -15,8 +16,6 @@ from ..effect import offered
 from ..effects import Acting
 from ..effects.declaration import Data, Setting
 from ..parameter import Parameter
-
-Array = np.ndarray[Any, Any]
 
 KIND = "pressure_hold"
 # Of the absolute pressure: how near its first readings a hold starts.

@@ -3,18 +3,16 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from typing import Any
 
 import attrs
 import numpy as np
 
+from ...arrays import Array
 from ...measured import Experiment
 from ..effects.declaration import Setting
 from ..instants import SHARE, finer
 from ..parameter import Parameter
 from .unit_pressure import UnitPressure, UnitResponse
-
-Array = np.ndarray[Any, Any]
 
 KIND = "pressure_step"
 # An interval this many times longer than usual has lost samples. Its mean pressure is unknown: for a step at

@@ -8,6 +8,7 @@ from typing import Any
 import attrs
 import numpy as np
 
+from ...arrays import Array
 from ...errors import ConvergenceError
 from ...measured import Experiment
 from ..effects import Acting
@@ -16,7 +17,6 @@ from ..instants import finer
 from ..load_cell import ZERO_SHARE, kPa_per_N
 from ..parameter import Parameter
 
-Array = np.ndarray[Any, Any]
 # Stress (n,) in kPa of strain (n,) at rest: 0 at 0, and rising.
 Law = Callable[[Array], Array]
 

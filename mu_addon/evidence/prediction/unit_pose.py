@@ -8,6 +8,7 @@ from typing import Any
 import attrs
 import numpy as np
 
+from ...arrays import Array
 from ...errors import InputError
 from ...measured import Experiment
 from ..effect import Effect, offered
@@ -15,8 +16,6 @@ from ..effects import Acting
 from ..effects.declaration import Data, Setting
 from ..parameter import Parameter
 from .unit_pressure import TO_THE_SUPPLY, UnitPressure, UnitResponse, believed
-
-Array = np.ndarray[Any, Any]
 
 KIND = "unit_pose"
 # Orientations about an axis that are simulated. Between them their trigonometric polynomial is used, exact if

@@ -11,6 +11,7 @@ from typing import Any
 import attrs
 import numpy as np
 
+from ...arrays import Array
 from ...errors import InputError
 from ...measured import Experiment
 from ...measured.pose import Direction, X, down
@@ -23,8 +24,6 @@ from ..effects.marker_slip import Recordings
 from ..lags import cycles
 from ..parameter import Parameter
 from .flat_obstacle import CONTACT, ObstacleResponse
-
-Array = np.ndarray[Any, Any]
 
 KIND = "unit_pressure"
 # Factor on the last computed pressure up to which the response is extrapolated along its end's slope.

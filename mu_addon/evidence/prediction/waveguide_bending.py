@@ -3,18 +3,16 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from typing import Any
 
 import numpy as np
 
+from ...arrays import Array
 from ...measured import Experiment
 from ..effect import offered
 from ..effects import Acting
 from ..effects.declaration import Data, Setting
 from ..lags import smooth_at
 from ..parameter import Parameter
-
-Array = np.ndarray[Any, Any]
 
 KIND = "waveguide_bending"
 

@@ -5,9 +5,7 @@ from typing import TYPE_CHECKING
 from ...lazy import public_face
 
 if TYPE_CHECKING:
-    from .plan import Plan as Plan
-    from .plan import read_plan as read_plan
-    from .point import Outcome as Outcome
-    from .point import Task as Task
+    from .plan import Plan, read_plan
+    from .point import Outcome, Task
 else:
     __getattr__, __dir__, __all__ = public_face(__name__)

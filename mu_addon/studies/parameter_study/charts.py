@@ -6,10 +6,9 @@ from typing import Any, Literal
 
 import numpy as np
 
+from ...arrays import Array
 from ...report.plots import CHOSEN, INK, QUIET, canvas
 from .main_effects import Effect
-
-Array = np.ndarray[Any, Any]
 
 
 def effect_chart(effect: Effect, values: list[Any], y: Array, name: str, output: str) -> str:

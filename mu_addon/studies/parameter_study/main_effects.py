@@ -8,7 +8,7 @@ from typing import Any
 import attrs
 import numpy as np
 
-Array = np.ndarray[Any, Any]
+from ...arrays import Array
 
 # Points that share one value of an input, or one of so many parts of its range.
 MOST_LEVELS = 8

@@ -13,6 +13,7 @@ from typing import Any
 import attrs
 import numpy as np
 
+from ...arrays import Array
 from ...design.parameters import Unit, load_preset, read_unit
 from ...errors import InputError, MuError
 from ...materials.library import load_material, read_material
@@ -27,7 +28,6 @@ from .point import Task
 from .settings import GRID, LAST_STAGE, MEMORY, METHOD, MINUTES, MOST_POINTS, POINTS, RESIN, SEED, SOBOL
 from .variable import FILE, Inputs, Variable, changed_inputs, variable
 
-Array = np.ndarray[Any, Any]
 OF_FILES = ("unit", "body", "protocol", "obstacles", "friction")
 """Keys of study.toml that belong to files beside it."""
 
