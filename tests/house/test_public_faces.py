@@ -51,7 +51,7 @@ def test_the_type_checker_sees_the_same_names(package):
 
 def test_a_face_works_from_a_zip_too(tmp_path):
     with zipfile.ZipFile(tmp_path / "packed.zip", "w") as packed:
-        for file in ("__init__.py", "lazy.py", "errors.py", *_python_files("measured")):
+        for file in ("__init__.py", "lazy.py", "errors.py", "arrays.py", *_python_files("measured")):
             packed.write(FOLDER / file, f"mu_addon/{file}")
     code = "from mu_addon import measured; print(measured.__file__, measured.__all__, measured.Remark)"
     command = [sys.executable, "-I", "-c", f"import sys; sys.path.insert(0, {packed.filename!r}); {code}"]

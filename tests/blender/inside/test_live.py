@@ -157,6 +157,8 @@ def test_a_real_job_comes_first(monkeypatch, tmp_path):
     root.mu_unit.study.folder = str(tmp_path / "unit")
     root.mu_live.on = True
     live.of(root).due_s = 0.0
+    # A kept shape of a unit like it is shown first.
+    live._tick()
     live._tick()
     child = live.of(root).child
     assert child.state == "running"
@@ -165,7 +167,7 @@ def test_a_real_job_comes_first(monkeypatch, tmp_path):
         live._tick()
         assert child.state != "running"
         assert live.of(root).child is None
-        assert words.words(root) == "After the running job"
+        assert words.words(root) == "After the running job (dim: a unit like it)"
     live._tick()
     assert live.of(root).child.state == "running", "after it, the unit is bent"
     # A duplicate is bent by a process of its own.
