@@ -23,7 +23,7 @@ if TYPE_CHECKING:
 
 def plan_of(root: Any, quick: bool = False) -> Plan:
     """Expected stages of a unit's simulation or quick ranking, with the seconds of each; raises MuError."""
-    return timings.expected(_without_bodies(root, quick))[0]
+    return _expected(root, quick)[0]
 
 
 def announced(root: Any, quick: bool = False) -> tuple[float, bool] | None:
@@ -32,10 +32,15 @@ def announced(root: Any, quick: bool = False) -> tuple[float, bool] | None:
     None where it cannot start.
     """
     try:
-        plan, known = timings.expected(_without_bodies(root, quick))
+        plan, known = _expected(root, quick)
     except MuError:
         return None
     return sum(seconds for _, seconds in plan), known
+
+
+def _expected(root: Any, quick: bool) -> tuple[Plan, bool]:
+    runs = (run.folder for run in studies.runs_of(root) if run.complete)
+    return timings.expected(_without_bodies(root, quick), runs)
 
 
 SIMULATION = JobKind(

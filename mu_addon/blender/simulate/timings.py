@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import json
 import re
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -37,6 +38,7 @@ def of_run(folder: Path) -> tuple[str, dict[str, float]]:
 READERS: dict[str, Callable[[Path], tuple[str, dict[str, Any]]]] = {}
 """By kind of job, what is in place of `of_run`."""
 _kept: FileCache[dict[str, dict[str, float]]] = FileCache()
+_runs: FileCache[tuple[str, dict[str, float]]] = FileCache()
 
 
 def _file() -> Path:
@@ -57,12 +59,15 @@ def measured(detail: str) -> dict[str, float]:
     return {str(k): float(v) for k, v in found.items() if isinstance(v, int | float) and v >= 0.0}
 
 
-def expected(wanted: Study) -> tuple[Plan, bool]:
+def expected(wanted: Study, runs: Iterable[Path] = ()) -> tuple[Plan, bool]:
     """Stages of a study with the seconds that they took here, else are declared to take.
 
-    The second result is True if all were measured.
+    runs: folders of complete studies, of which one may be alike. The second result is True if all were
+    measured.
     """
-    declared, taken = wanted.expected(), measured(wanted.detail())
+    declared, detail = wanted.expected(), wanted.detail()
+    found = (_runs.read([folder / SUMMARY], partial(of_run, folder)) for folder in runs)
+    taken = measured(detail) | next((one[1] for one in found if one and one[0] == detail), {})
     alike = {_NUMBER.sub("", title): seconds for title, seconds in taken.items()}
     known = {title: taken.get(title, alike.get(_NUMBER.sub("", title))) for title in declared}
     plan = [(title, declared[title] if s is None else s) for title, s in known.items()]
@@ -99,3 +104,4 @@ def _ended(key: str) -> None:
 @at_end
 def _forget() -> None:
     _kept.clear()
+    _runs.clear()
