@@ -24,11 +24,12 @@ ON_MESH = {
     "motion of the paths": (25.0, 0.0), "check of the best paths": (1450.0, 0.0),
 }  # fmt: skip
 """Seconds of a stage on the default mesh under the shipped protocol, and those that no mesh shortens."""
-TOUCHING = {"Model A": 13.0, "candidates": 3.0}
-"""Work of a state at -20 kPa where walls touch, in units of one under pressure; it grows as the square of the
-pressure. Candidates start from Model A's states."""
-CROSSING = {"Model A": 30.0, "candidates": 1.0}
-"""The same without self-contact, where walls pass through each other and parts of the unit snap."""
+TOUCHING = 3.0
+"""Work of a candidate's state at -20 kPa where walls touch, in units of one under pressure; it grows as the
+square of the pressure."""
+WAY_TOUCHING, WAY_CROSSING = 14.0, 36.0
+"""Work of Model A's way to -20 kPa, beside a unit for each state: where walls touch, and without
+self-contact, where they pass through each other and parts of the unit snap."""
 LEFT_UNDER_PRESSURE = 0.55
 """Share left out of the states after the highest pressure, of paths that are not the best, without suction:
 15 of 27 of `mu-1.0x`."""
@@ -103,16 +104,18 @@ class Size:
         return body * (states * paths - left) / 10
 
 
-def work(job: Size, pressures_kPa: Iterable[float], stage: str = "candidates") -> float:
-    """Work of the states at these pressures, in units of one under pressure; none at 0 kPa."""
-    most = (TOUCHING if job.self_contact else CROSSING)[stage]
-    return sum(max(most * (p / 20.0) ** 2, 1.0) if p < 0 else 1.0 for p in pressures_kPa if p)
+def work(job: Size, pressures_kPa: Iterable[float]) -> float:
+    """Work of candidates' states at these pressures, in units of one under pressure; none at 0 kPa."""
+    touches = job.self_contact
+    return sum(max(TOUCHING * (p / 20.0) ** 2, 1.0) if touches and p < 0 else 1.0 for p in pressures_kPa if p)
 
 
 def _side_by_side(job: Size) -> float:
     """Work of Model A's states on two cores: suction beside pressure."""
-    sides = ([p for p in job.pressures_kPa if (p < 0) == suction] for suction in (True, False))
-    return max(1.0, *(work(job, side, "Model A") for side in sides))
+    suction = [p for p in job.pressures_kPa if p < 0]
+    way = WAY_TOUCHING if job.self_contact else WAY_CROSSING
+    under_suction = way * (min(suction, default=0.0) / 20.0) ** 2 + len(suction)
+    return max(1.0, under_suction, sum(p > 0 for p in job.pressures_kPa))
 
 
 def of_mesh(refine: float) -> float:
