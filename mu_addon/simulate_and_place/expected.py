@@ -24,9 +24,9 @@ ON_MESH = {
     "motion of the paths": (25.0, 0.0), "check of the best paths": (1450.0, 0.0),
 }  # fmt: skip
 """Seconds of a stage on the default mesh under the shipped protocol, and those that no mesh shortens."""
-TOUCHING = 3.0
-"""Work of a candidate's state at -20 kPa where walls touch, in units of one under pressure; it grows as the
-square of the pressure."""
+SUCTION = 3.0
+"""Work of a candidate's state at -20 kPa, where walls touch or parts of the unit snap, in units of one under
+pressure; it grows as the square of the pressure."""
 WAY_TOUCHING, WAY_CROSSING = 14.0, 36.0
 """Work of Model A's way to -20 kPa, beside a unit for each state: where walls touch, and without
 self-contact, where they pass through each other and parts of the unit snap."""
@@ -91,23 +91,22 @@ class Size:
         body = of_mesh(self.refine) * self.chambers / 6
         if stage == "Model A":
             return body * _side_by_side(self) / _side_by_side(shipped)
-        whole = work(shipped, SHIPPED_KPA)
-        states = max(work(self, self.pressures_kPa), 1.0) / whole
+        whole = work(SHIPPED_KPA)
+        states = max(work(self.pressures_kPa), 1.0) / whole
         if stage != "candidates":
             return body * states
         paths = (self.chambers - 1) * (self.chambers - 2) / 2
         _, rest = first_and_rest(np.array(self.pressures_kPa))
-        later = work(self, [self.pressures_kPa[n] for n in rest]) / whole
+        later = work(self.pressures_kPa[n] for n in rest) / whole
         left = later * max(paths - self.known, 0) if self.known else 0.0
         if min(self.pressures_kPa) >= 0.0:
             left *= LEFT_UNDER_PRESSURE
         return body * (states * paths - left) / 10
 
 
-def work(job: Size, pressures_kPa: Iterable[float]) -> float:
+def work(pressures_kPa: Iterable[float]) -> float:
     """Work of candidates' states at these pressures, in units of one under pressure; none at 0 kPa."""
-    touches = job.self_contact
-    return sum(max(TOUCHING * (p / 20.0) ** 2, 1.0) if touches and p < 0 else 1.0 for p in pressures_kPa if p)
+    return sum(max(SUCTION * (min(p, 0.0) / 20.0) ** 2, 1.0) for p in pressures_kPa if p)
 
 
 def _side_by_side(job: Size) -> float:
