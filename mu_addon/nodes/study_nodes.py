@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+from pathlib import Path
+from typing import Any
+
 from ..design.body import read_body
 from ..design.gripper import Fingers, Gripper, Plate
 from ..design.quantity import describe
@@ -39,7 +42,8 @@ def obstacle(call: Call) -> Outputs:
     return {"obstacle": RigidBody(read_body(s["file"]), s["friction"])}
 
 
-def _study_of_place(call: Call, what: str) -> Finished:
+def _found_by_place(call: Call, what: str) -> tuple[Path, dict[str, Any]]:
+    """Folder of a study, and what its ranking found, by name; raises InputError without it."""
     study: Finished = call.inputs["study"]
     if what not in study.summary:
         raise InputError(
@@ -47,7 +51,7 @@ def _study_of_place(call: Call, what: str) -> Finished:
             "study",
             "link a node Rank Paths",
         )
-    return study
+    return study.folder, study.summary[what]
 
 
 @node(
@@ -58,8 +62,8 @@ def _study_of_place(call: Call, what: str) -> Finished:
 )
 def sensitivity(call: Call) -> Outputs:
     """The map of how much stiffness anywhere disturbs the motion, and its largest value in mm."""
-    found = _study_of_place(call, "sensitivity").summary["sensitivity"]
-    return {"field": call.inputs["study"].folder / found["file"], "largest": float(found["largest_mm"])}
+    folder, found = _found_by_place(call, "sensitivity")
+    return {"field": folder / found["file"], "largest": float(found["largest_mm"])}
 
 
 @node(
@@ -70,9 +74,10 @@ def sensitivity(call: Call) -> Outputs:
 )
 def light(call: Call) -> Outputs:
     """The signal of a waveguide along every path, and the largest per degree of bending."""
-    found = _study_of_place(call, "light").summary["light"]["sensitivity_per_deg"]
-    best = max(found, key=lambda name: abs(found[name]))
-    return {"signals": call.inputs["study"].folder / "signals.csv", "largest": found[best], "path": best}
+    folder, found = _found_by_place(call, "light")
+    per_deg = found["sensitivity_per_deg"]
+    best = max(per_deg, key=lambda name: abs(per_deg[name]))
+    return {"signals": folder / "signals.csv", "largest": per_deg[best], "path": best}
 
 
 @node(

@@ -8,7 +8,7 @@ import bpy
 
 from ...design.printing.finding import counted
 from ..import_data.importing import draw_import
-from ..jobs.panel import draw_job, open_buttons, timed_if_measured
+from ..jobs.panel import draw_job, open_buttons, timed
 from ..shared.panels import alert, fold, wrapped
 from ..shared.wording import in_panel, readable
 from ..unit.base_classes import DONE, OUTDATED, UnitPanel
@@ -57,7 +57,7 @@ class MU_PT_evidence(UnitPanel, bpy.types.Panel):
 
 def start_words(root) -> str:
     """Label of the button that starts the diagnosis, with what it takes once measured on this machine."""
-    return timed_if_measured("Diagnose", evidence.announced(root))
+    return timed("Diagnose", evidence.announced(root))
 
 
 def _experiments(layout, context, root, measured):

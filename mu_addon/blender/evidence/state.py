@@ -100,12 +100,13 @@ def _timed(folder: Path) -> tuple[str, dict[str, Any]]:
     return _detail(kind for kind, _ in summary["experiments"].values()), summary["seconds"]
 
 
-def announced(root: Any) -> float | None:
-    """Expected seconds of a diagnosis, as one of such data took on this machine; None before the first."""
+def announced(root: Any) -> tuple[float, bool] | None:
+    """Seconds that a diagnosis of such data took on this machine, and True; None before the first."""
     found = measured_data(root)
     if found is None or found.measured is None:
         return None
-    return timings.announced(_detail(e.kind for e in found.measured.experiments))
+    taken = timings.measured(_detail(e.kind for e in found.measured.experiments))
+    return (sum(taken.values()), True) if taken else None
 
 
 DIAGNOSIS = JobKind(

@@ -14,6 +14,7 @@ from ..shared import timeline
 from ..shared.blender_property import exact
 from ..shared.file_cache import FileCache
 from ..simulate import study_folder as studies
+from ..simulate import timings
 from ..simulate.study_job import StudyJob
 from . import object as gripper_object
 from .properties import to_gripper
@@ -62,6 +63,7 @@ GRASPING = StudyJob(
     beside=("cubes_mm", "coarse", "refine", "self_contact", "solid_only", "quality"),
     claim=_claim,
 )
+timings.READERS[GRASP.name] = timings.of_run
 _tables: FileCache[Any] = FileCache()
 
 

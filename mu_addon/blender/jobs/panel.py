@@ -53,15 +53,12 @@ def rounded(seconds: float) -> str:
     return f"{hours}{minutes % 60} min".removesuffix(" 0 min")
 
 
-def timed(name: str, announced: tuple[float, bool]) -> str:
-    """Label of a button with its job's expected seconds: "about" if measured on this machine."""
+def timed(name: str, announced: tuple[float, bool] | None) -> str:
+    """Label of a button with its job's expected seconds, if known: "about" if measured on this machine."""
+    if announced is None:
+        return name
     seconds, measured = announced
     return f"{name}, {'about' if measured else 'perhaps'} {rounded(seconds)}"
-
-
-def timed_if_measured(name: str, seconds: float | None) -> str:
-    """Label of a button with its job's expected seconds if they were measured on this machine."""
-    return name if seconds is None else timed(name, (seconds, True))
 
 
 def job_state(layout, child, where: str, prefix: str = "") -> None:

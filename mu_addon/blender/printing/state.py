@@ -28,7 +28,7 @@ from ..jobs.start_child import OWN_FOLDER, JobKind
 from ..shared.blender_property import exact
 from ..shared.file_cache import FileCache
 from ..simulate import study_folder as studies
-from ..simulate import study_job
+from ..simulate import study_job, timings
 from ..unit import envelope, stack
 from ..unit.object import chosen_window
 from ..unit.properties import shape_hash, to_unit
@@ -56,6 +56,7 @@ def latest_folder(root: Any) -> Path:
 PRINTING = JobKind(
     "print", lambda root: root.mu_unit.uuid, latest_folder, "job for the printer", prefix="print_"
 )
+timings.READERS[PRINTING.name] = timings.of_run
 
 _printers: FileCache[Printer] = FileCache()
 _measured: FileCache[dict[str, Limit]] = FileCache()

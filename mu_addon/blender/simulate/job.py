@@ -17,13 +17,15 @@ from . import effects, timings
 from . import study_folder as studies
 
 if TYPE_CHECKING:
+    from pathlib import Path
+
     from ...run.progress_estimate import Plan
     from ...studies.unit_ranking import UnitStudy
 
 
 def plan_of(root: Any, quick: bool = False) -> Plan:
     """Expected stages of a unit's simulation or quick ranking, with the seconds of each; raises MuError."""
-    return _expected(root, quick)[0]
+    return timings.expected(*_asked(root, quick))[0]
 
 
 def announced(root: Any, quick: bool = False) -> tuple[float, bool] | None:
@@ -32,15 +34,14 @@ def announced(root: Any, quick: bool = False) -> tuple[float, bool] | None:
     None where it cannot start.
     """
     try:
-        plan, known = _expected(root, quick)
+        return timings.announced(*_asked(root, quick))
     except MuError:
         return None
-    return sum(seconds for _, seconds in plan), known
 
 
-def _expected(root: Any, quick: bool) -> tuple[Plan, bool]:
-    runs = (run.folder for run in studies.runs_of(root) if run.complete)
-    return timings.expected(_without_bodies(root, quick), runs)
+def _asked(root: Any, quick: bool) -> tuple[UnitStudy, list[Path]]:
+    """The study, and folders of the unit's complete runs."""
+    return _without_bodies(root, quick), [run.folder for run in studies.runs_of(root) if run.complete]
 
 
 SIMULATION = JobKind(
@@ -51,6 +52,7 @@ SIMULATION = JobKind(
     heavy=True,
     plan_of=plan_of,
 )
+timings.READERS[SIMULATION.name] = timings.of_run
 
 
 def job_of(root: Any, in_short: bool = False) -> UnitStudy:

@@ -49,12 +49,12 @@ class MU_PT_simulate(UnitPanel, bpy.types.Panel):
             layout.prop(study, "self_friction")
         layout.prop(study, "protocol")
         _effects(layout, root)
-        child = SIMULATION.child(root)
-        start_button(layout, child, "mu.simulate", "PLAY", root=root, text=start_words(root))
+        child, expected = SIMULATION.child(root), announced(root)
+        start_button(layout, child, "mu.simulate", "PLAY", root=root, text=timed("Simulate", expected))
         if study.command == "place" and not SIMULATION.is_running(root):
-            words = start_words(root, "Quick Ranking", quick=True)
+            words = timed("Quick Ranking", announced(root, quick=True))
             layout.operator("mu.simulate", text=words, icon="PLAY").quick = True
-        if child is None and (announced(root) or (0.0, True))[1] is False:
+        if child is None and expected is not None and not expected[1]:
             wrapped(layout, "Perhaps: no such run has been timed on this machine yet", "TIME")
         job_state(layout, child, "see Results")
         others = [job for job in start_child.running() if job.key != SIMULATION.key(root)]
@@ -69,10 +69,9 @@ class MU_PT_simulate(UnitPanel, bpy.types.Panel):
             body.prop(study, "folder")
 
 
-def start_words(root, name: str = "Simulate", quick: bool = False) -> str:
-    """Label of a button: the job, and its expected duration, measured on this machine or declared."""
-    expected = announced(root, quick)
-    return name if expected is None else timed(name, expected)
+def start_words(root) -> str:
+    """Label of the button: the job, and its expected duration, measured on this machine or declared."""
+    return timed("Simulate", announced(root))
 
 
 def _effects(layout, root) -> None:

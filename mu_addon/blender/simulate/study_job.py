@@ -108,8 +108,7 @@ class StudyJob:
 
     def announced(self, root: Any) -> tuple[float, bool]:
         """Expected seconds, and True if every stage was measured on this machine; raises MuError."""
-        plan, known = timings.expected(self.inputs(root))
-        return sum(seconds for _, seconds in plan), known
+        return timings.announced(self.inputs(root))
 
     def plan(self, root: Any) -> Plan:
         """Expected stages with the seconds of each; raises MuError."""

@@ -25,7 +25,6 @@ from ..shared.registration import at_end, connected
 LEAST_SHARE = 0.05
 """A stage that took less than this share of its earlier time was cached, and is not a measurement."""
 
-
 # Members of a set differ in a number: one takes about as long as another.
 _NUMBER = re.compile(r"[\d.]+")
 
@@ -36,7 +35,7 @@ def of_run(folder: Path) -> tuple[str, dict[str, float]]:
 
 
 READERS: dict[str, Callable[[Path], tuple[str, dict[str, Any]]]] = {}
-"""By kind of job, what is in place of `of_run`."""
+"""By kind of job whose seconds are kept: `of_run`, or a function like it."""
 _kept: FileCache[dict[str, dict[str, float]]] = FileCache()
 _runs: FileCache[tuple[str, dict[str, float]]] = FileCache()
 
@@ -74,10 +73,10 @@ def expected(wanted: Study, runs: Iterable[Path] = ()) -> tuple[Plan, bool]:
     return [*plan, ("report", taken.get("report", wanted.report_s))], None not in known.values()
 
 
-def announced(detail: str) -> float | None:
-    """Expected seconds of a job of that detail: those of all stages of its last one here; None without."""
-    taken = measured(detail)
-    return sum(taken.values()) if taken else None
+def announced(wanted: Study, runs: Iterable[Path] = ()) -> tuple[float, bool]:
+    """Seconds of all stages of a study, see `expected`, and True if all were measured."""
+    plan, known = expected(wanted, runs)
+    return sum(seconds for _, seconds in plan), known
 
 
 def note(detail: str, seconds: dict[str, float]) -> None:
@@ -90,9 +89,9 @@ def note(detail: str, seconds: dict[str, float]) -> None:
 @connected(start_child.JOB_ENDED)
 def _ended(key: str) -> None:
     child = start_child.child_of(key)
-    if child is None or child.state != DONE:
+    read = READERS.get(key.rpartition(":")[2])
+    if child is None or child.state != DONE or read is None:
         return
-    read = READERS.get(key.rpartition(":")[2], of_run)
     try:
         detail, seconds = read(child.folder.parent)
         note(detail, {str(name): float(s) for name, s in seconds.items()})
