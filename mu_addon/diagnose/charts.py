@@ -12,7 +12,7 @@ import numpy as np
 from ..arrays import Array
 from ..evidence.effect import readable
 from ..evidence.gain_on_unseen import Errors
-from ..evidence.residuals import Dependence
+from ..evidence.residual_tests.dependence import Dependence
 from ..report.plots import BY_LENGTH, CHOSEN, INK, QUIET, WIDTH, canvas, signed
 from .judged_data import Curve
 

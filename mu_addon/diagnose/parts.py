@@ -13,7 +13,8 @@ from ..evidence.effect import Parameter, bare, readable
 from ..evidence.fit import Fit
 from ..evidence.found_causes import BEYOND, RIVAL_DELTA_CHI2
 from ..evidence.record import KNOWN, repeats
-from ..evidence.residuals import CONDITIONS, COVARIATES, FALSE_ALARM
+from ..evidence.residual_tests.quantities import CONDITIONS, COVARIATES
+from ..evidence.residual_tests.table import FALSE_ALARM
 from ..evidence.scatter import noise_limit
 from ..evidence.sensitivity import best_seen
 from ..report.plots import signed

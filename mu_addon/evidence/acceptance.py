@@ -13,7 +13,7 @@ from .fit import PRIOR, Fit, Fitter
 from .found_causes import FALSE_ALARM_RATE, LAW, RIVAL_DELTA_CHI2, Selection
 from .plausibility import at_a_bound, held_back, unabsorbed, value_at_a_bound
 from .record import KNOWN
-from .residuals import Dependence
+from .residual_tests.dependence import Dependence
 from .scatter import STATED, excess
 
 # An effect of which nuisances leave less than this stands in for them.

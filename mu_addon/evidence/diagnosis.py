@@ -27,7 +27,8 @@ from .owned import coincident_effects
 from .plausibility import require_plausible
 from .readings import without_unpredicted_readings, without_wrong_readings
 from .record import Record, record
-from .residuals import ALTERNATION, BY_TURN, strict_table, structure
+from .residual_tests.table import strict_table, structure
+from .residual_tests.without_clock import ALTERNATION, BY_TURN
 from .rivals import beyond_bounds, coinciding, with_promising_rivals
 from .scatter import (
     NEAR,

@@ -8,7 +8,8 @@ import attrs
 
 from .effect import Effect
 from .fit import Fit
-from .residuals import Dependence, structure
+from .residual_tests.dependence import Dependence
+from .residual_tests.table import structure
 
 # False-positive probability of naming any effect of the library.
 FALSE_ALARM_RATE = 5e-4

@@ -12,7 +12,7 @@ from .effects import CAMERA
 from .fit import Fit, Fitter
 from .found_causes import RIVAL_DELTA_CHI2
 from .plausibility import at_a_bound
-from .residuals import strict_table, structure
+from .residual_tests.table import strict_table, structure
 from .sensitivity import ABSORBED
 
 # Number of models that the next effect is added to: the best may be wrong while two effects pass for one.

@@ -13,7 +13,7 @@ from .found_causes import LAW, RIVAL_DELTA_CHI2, Cause, Selection
 from .hypotheses import by_search, ranked
 from .outliers import NAME as OUTLIER
 from .plausibility import at_a_bound
-from .residuals import strict_table, structure
+from .residual_tests.table import strict_table, structure
 from .rivals import causes_of, nearest, not_chosen, promising_rivals, with_rivals
 from .scatter import ALONE
 from .significance import by_count

@@ -13,7 +13,7 @@ from ..measured import Experiment
 from .fit import Fit, Fitter
 from .readings import ALIKE, MOST_WRONG, TIMES_MORE
 from .record import KNOWN, Series
-from .residuals import FALSE_ALARM
+from .residual_tests.table import FALSE_ALARM
 
 NAME = "outlier"
 
@@ -23,7 +23,7 @@ def without_outliers(
 ) -> tuple[list[Experiment], list[str]]:
     """The experiments without readings whose residual exceeds chance, and a text on these readings.
 
-    By a normal deviate each, at the rate at which `residuals.structure` sees an outlier among so many tests.
+    By a normal deviate each, at the rate at which `structure` sees an outlier among so many tests.
     Unchanged if a series has more of them than `MOST_WRONG`, or if they look like a clock offset or a lag:
     each is off by at most the prediction's change there, and so is more than one in `TIMES_MORE` of the
     readings that change as fast.

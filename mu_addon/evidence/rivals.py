@@ -34,7 +34,7 @@ from .hypotheses import (
 )
 from .owned import owned_effects
 from .plausibility import at_a_bound, widened
-from .residuals import strict_table
+from .residual_tests.table import strict_table
 from .sensitivity import ABSORBED, Sensitivity
 
 # Number of a cause's rivals that are fitted by all laws of their mechanisms, and the share of the cause's

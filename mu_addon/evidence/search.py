@@ -26,7 +26,7 @@ from .hypotheses import (
 from .owned import owned_effects, owners
 from .plausibility import at_a_bound
 from .pooled import fits_among, pooled_effects, sizes_of
-from .residuals import dependence_table, strict_table, structure, taken_by_scales
+from .residual_tests.table import dependence_table, strict_table, structure, taken_by_scales
 from .rivals import causes_of, pairs_for
 from .sensitivity import Sensitivity, sensitivities
 from .significance import by_count, by_gauges, false_alarm_probability, gain_of

@@ -10,7 +10,7 @@ from scipy.integrate import solve_ivp
 from mu_addon.evidence.fit import Fitter
 from mu_addon.evidence.noise import Source
 from mu_addon.evidence.record import record
-from mu_addon.evidence.residuals import strict_table, structure
+from mu_addon.evidence.residual_tests.table import strict_table, structure
 from mu_addon.evidence.ringing import modes, ringing
 from tests.evidence import analytic
 

@@ -14,7 +14,7 @@ from mu_addon.evidence.hypotheses import beside, hypotheses, ranked
 from mu_addon.evidence.noise import Source
 from mu_addon.evidence.prediction.unit_pressure import UnitPressure
 from mu_addon.evidence.record import record
-from mu_addon.evidence.residuals import dependence_table, strict_table, structure
+from mu_addon.evidence.residual_tests.table import dependence_table, strict_table, structure
 from mu_addon.evidence.search import one_more, reselected, select
 from mu_addon.evidence.sensitivity import SEEN, best_seen, sensitivities
 from mu_addon.evidence.simulator import Composite

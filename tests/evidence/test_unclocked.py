@@ -12,7 +12,7 @@ from mu_addon.evidence.diagnosis import diagnose
 from mu_addon.evidence.noise import estimate
 from mu_addon.evidence.prediction.bench import bench_simulators
 from mu_addon.evidence.record import record
-from mu_addon.evidence.residuals import ALTERNATION
+from mu_addon.evidence.residual_tests.without_clock import ALTERNATION
 from mu_addon.evidence.scatter import FEW, TIMES
 from mu_addon.evidence.simulator import Composite
 from mu_addon.evidence.unclocked import AROUND, IN_A_ROW, MOST, lone, points
