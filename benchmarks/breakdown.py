@@ -16,8 +16,9 @@ from mu_addon.fem import factor, model, self_contact
 from mu_addon.fem.bending_angle import bending_angle_deg
 from mu_addon.fem.equilibrium import Equilibrium
 from mu_addon.fem.newton_settings import RESOLVED_CONTACT_NEWTON
+from mu_addon.fem.self_contact import self_contact_of
 from mu_addon.fem.state import rest
-from mu_addon.fem.unit_materials_and_contact import materials_of, self_contact_of
+from mu_addon.fem.unit_materials import materials_of
 from mu_addon.meshing.settings import MeshSettings
 
 BARRIER = "pairs, distances and the barrier's derivatives"

@@ -20,7 +20,7 @@ from mu_addon.errors import MuError
 from mu_addon.fem.bending_angle import TipSection
 from mu_addon.fem.equilibrium import Equilibrium
 from mu_addon.fem.model import Model
-from mu_addon.fem.unit_materials_and_contact import materials_of
+from mu_addon.fem.unit_materials import materials_of
 from mu_addon.meshing.settings import MeshSettings
 
 PRESSURES_KPA = -10.0, -5.0, 5.0, 10.0, 20.0, 40.0

@@ -20,7 +20,7 @@ from mu_addon.design.parameters import load_preset
 from mu_addon.fem.bending_angle import bending_angle_deg
 from mu_addon.fem.equilibrium import Equilibrium
 from mu_addon.fem.model import Model
-from mu_addon.fem.unit_materials_and_contact import materials_of
+from mu_addon.fem.unit_materials import materials_of
 from mu_addon.meshing.settings import MeshSettings
 from tests.design.kinds import CORNERS, FACES, cross, custom, octet
 

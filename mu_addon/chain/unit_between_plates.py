@@ -17,7 +17,7 @@ from ..fem.factor import IndefiniteError
 from ..fem.model import Model
 from ..fem.newton_settings import RESOLVED_NEWTON
 from ..fem.rotations import rotation, skew
-from ..fem.unit_materials_and_contact import materials_of
+from ..fem.unit_materials import materials_of
 from ..meshing.mesh import Mesh
 from .rigid_motion import exponential, inverse, logarithm, motion, rotation_vector, slope
 

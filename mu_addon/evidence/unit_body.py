@@ -98,7 +98,7 @@ class Body:
 
     def materials(self, mesh: Mesh) -> Materials:
         """The base model's materials on a mesh; raises InputError if the unit's wall has a law of its own."""
-        from ..fem.unit_materials_and_contact import materials_of
+        from ..fem.unit_materials import materials_of
 
         if self.unit.wall.names:
             raise InputError(

@@ -17,9 +17,9 @@ from ..errors import ConvergenceError, InputError, MeshingError
 from ..fem.bending_angle import TipSection
 from ..fem.equilibrium import Equilibrium
 from ..fem.held_tip import HeldTip
+from ..fem.self_contact import self_contact_of
 from ..fem.state import State
 from ..fem.trajectory import branches
-from ..fem.unit_materials_and_contact import self_contact_of
 from ..measured.pose import X
 from ..run.cache import Cache
 from .effects import ON_UNITS

@@ -33,6 +33,6 @@ if TYPE_CHECKING:
     from .stress import cauchy, von_mises
     from .time_stepping import Instant, simulate_in_time
     from .trajectory import Trajectory, simulate
-    from .unit_materials_and_contact import materials_of
+    from .unit_materials import materials_of
 else:
     __getattr__, __dir__, __all__ = public_face(__name__)

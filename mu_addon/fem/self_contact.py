@@ -13,7 +13,8 @@ from scipy import sparse
 from scipy.sparse.csgraph import dijkstra
 
 from ..arrays import Array
-from ..design.quantity import in_kPa
+from ..design.parameters import Unit
+from ..design.quantity import in_kPa, in_MPa
 from ..errors import InputError
 from ..meshing.mesh import AXES, LATTICE, Mesh, pieces
 from .outer_faces import free_boundary
@@ -35,6 +36,9 @@ _SMALL = 1e-4
 _MARGIN = 0.3
 # Slip in gaps at which friction is full.
 _SLIP = 0.1
+# Of a unit: the gap over the wall's thickness, and the barrier's stiffness over the resin's modulus;
+# docs/engineering/method.md says what they move.
+_GAP_SHARE, _BARRIER_SHARE = 1 / 9, 0.04
 # Share of the way to a mirror plane that a step may go, as ipctk has it for the way to a touch.
 _SHORT_OF_TOUCH = 0.8
 
@@ -602,3 +606,19 @@ def _free_facets(mesh: Mesh) -> Array:
     wall[mesh.tets[mesh.region != LATTICE]] = True
     of_wall = wall[faces].all(axis=1)
     return np.concatenate([facets_of(faces[of_wall]), faces[~of_wall][:, :3]])
+
+
+def self_contact_of(unit: Unit, mesh: Mesh, friction: float = 0.0) -> SelfContact:
+    """Self-contact of a resolved mesh's walls and struts, with friction between them. Raises InputError."""
+    return SelfContact(mesh, *_barrier_of(unit), friction)
+
+
+def relocated_contact(contact: SelfContact, unit: Unit, mesh: Mesh) -> SelfContact:
+    """Contact of a unit whose mesh is that of another with moved nodes; see `self_contact_of`."""
+    return contact.relocated(mesh, *_barrier_of(unit))
+
+
+def _barrier_of(unit: Unit) -> tuple[float, float]:
+    """Gap in mm and stiffness in MPa of a unit's contact with itself."""
+    resin_MPa = in_MPa(unit.material.membrane_modulus_kPa)
+    return _GAP_SHARE * unit.printed.thinnest_wall, _BARRIER_SHARE * resin_MPa

@@ -24,7 +24,8 @@ from ..fem.materials import Materials
 from ..fem.model import Model
 from ..fem.moved_nodes import relocated
 from ..fem.newton_settings import RESOLVED_CONTACT_NEWTON, RESOLVED_NEWTON, NewtonSettings
-from ..fem.unit_materials_and_contact import materials_of, relocated_contact, self_contact_of
+from ..fem.self_contact import relocated_contact, self_contact_of
+from ..fem.unit_materials import materials_of
 from ..meshing.mesh import Mesh
 from ..meshing.settings import MeshSettings
 from .freedoms import Freedom, changed_unit

@@ -53,7 +53,7 @@ class Mechanics:
 
     def materials(self, mesh: Mesh) -> Materials:
         """Materials of the unit's mesh, effects and all."""
-        from ..fem.unit_materials_and_contact import materials_of
+        from ..fem.unit_materials import materials_of
 
         return self.effects.materials(materials_of(self.unit, mesh), mesh)
 
@@ -66,7 +66,7 @@ class Mechanics:
 
             model.obstacles = obstacles_of(self.obstacles, self.unit, mesh)
         if self.self_contact:
-            from ..fem.unit_materials_and_contact import self_contact_of
+            from ..fem.self_contact import self_contact_of
 
             model.self_contact = self_contact_of(self.unit, mesh, self.self_friction)
         return model

@@ -24,7 +24,7 @@ from ..report.motion_files import Surface, SurfaceFields, surfaces_of
 from .mechanics import Mechanics, Samples
 from .model_a import InTime
 from .motion_checks import crossings
-from .motion_tables import Reached, Row, SelfContact, self_contact_of, stretch_rows
+from .motion_tables import Reached, Row, SelfContactRows, self_contact_rows, stretch_rows
 
 if TYPE_CHECKING:
     from ..fem.equilibrium import Equilibrium
@@ -117,7 +117,7 @@ class StateFields:
     surfaces: dict[str, Surface]
     surface: dict[str, Array]
     of_elements: tuple[dict[str, Array], ...]
-    itself: SelfContact
+    itself: SelfContactRows
 
 
 _LOOKED: WeakKeyDictionary[State, StateFields] = WeakKeyDictionary()
@@ -132,18 +132,18 @@ def state_fields(mechanics: Mechanics, motion: Trajectory, instants: InTime | No
     if new:
         looked = SurfaceFields(mesh, {name: one.node for name, one in surfaces.items()})
         states, materials = [motion.solved[number] for number in new], mechanics.materials(mesh)
-        itself = self_contact_of(mechanics, mesh, states)
+        itself = self_contact_rows(mechanics, mesh, states)
         for at, (number, state) in enumerate(zip(new, states, strict=True)):
             history, of_elements = [remembered[number] if remembered else ()], list[dict[str, Array]]()
             surface = looked.of_states([state.u], materials, history.__getitem__, of_elements)
-            own = SelfContact(itself.rows[at : at + 1], itself.pressure_kPa[at : at + 1])
+            own = SelfContactRows(itself.rows[at : at + 1], itself.pressure_kPa[at : at + 1])
             _LOOKED[state] = StateFields(surfaces, surface, tuple(of_elements), own)
     found = [_LOOKED[state] for state in motion.solved]
     return StateFields(
         surfaces,
         {name: np.concatenate([one.surface[name] for one in found]) for name in found[0].surface},
         tuple(values for one in found for values in one.of_elements),
-        SelfContact(
+        SelfContactRows(
             tuple(row for one in found for row in one.itself.rows),
             tuple(pressure for one in found for pressure in one.itself.pressure_kPa),
         ),

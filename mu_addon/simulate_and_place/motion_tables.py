@@ -13,9 +13,9 @@ from ..body.joint_stretch import joint_stretch
 from ..design.body import covering
 from ..fem.bending_angle import TipSection
 from ..fem.kinematics import cavity_volume_mm3
+from ..fem.self_contact import self_contact_of
 from ..fem.state import State
 from ..fem.stress import peak_stretch
-from ..fem.unit_materials_and_contact import self_contact_of as contact_of
 from ..meshing.mesh import LATTICE, MEMBRANE, Mesh
 
 if TYPE_CHECKING:
@@ -102,18 +102,18 @@ def stretch_rows(
 
 
 @attrs.frozen(eq=False)
-class SelfContact:
+class SelfContactRows:
     """Contact of a unit with itself: rows of self_contact.csv, and pressure (n,) in kPa, of every state."""
 
     rows: tuple[Row, ...] = ()
     pressure_kPa: tuple[Array, ...] = ()
 
 
-def self_contact_of(mechanics: Mechanics, mesh: Mesh, states: Sequence[State]) -> SelfContact:
+def self_contact_rows(mechanics: Mechanics, mesh: Mesh, states: Sequence[State]) -> SelfContactRows:
     """Self-contact of every state; none where it is not simulated."""
     if not mechanics.self_contact:
-        return SelfContact()
-    contact = contact_of(mechanics.unit, mesh, mechanics.self_friction)
+        return SelfContactRows()
+    contact = self_contact_of(mechanics.unit, mesh, mechanics.self_friction)
     found = [contact.touch(state.u) for state in states]
     rows: list[Row] = []
     for state, touch in zip(states, found, strict=True):
@@ -123,4 +123,4 @@ def self_contact_of(mechanics: Mechanics, mesh: Mesh, states: Sequence[State]) -
             place = (f"{x:.2f}" for x in mesh.nodes[node])
             row[2:] = [f"{touch.gap_mm:.4f}", f"{touch.pressure_kPa[node]:.4g}", *place]
         rows.append(tuple(row))
-    return SelfContact(tuple(rows), tuple(touch.pressure_kPa for touch in found))
+    return SelfContactRows(tuple(rows), tuple(touch.pressure_kPa for touch in found))

@@ -257,7 +257,7 @@ class Grip(Study):
     ) -> grasp.Grasp:
         """The grasp of a cube, phase by phase."""
         from ..fem.newton_settings import RESOLVED_CONTACT_NEWTON, RESOLVED_OBSTACLE_NEWTON
-        from ..fem.unit_materials_and_contact import self_contact_of
+        from ..fem.self_contact import self_contact_of
 
         return grasp.grasp(
             fingers,

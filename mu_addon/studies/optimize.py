@@ -480,7 +480,7 @@ def mechanics_of(
 
     refine: of the mesh, by default the search's. Raises InputError where the unit cannot have the model.
     """
-    from ..fem.unit_materials_and_contact import materials_of
+    from ..fem.unit_materials import materials_of
     from ..simulate_and_place.extended_unit import extend
     from ..simulate_and_place.named_effects import NamedEffects
 

@@ -20,7 +20,7 @@ from mu_addon.fem.model import Model
 from mu_addon.fem.obstacle import Obstacle
 from mu_addon.fem.rigid import Sphere
 from mu_addon.fem.stress import cauchy
-from mu_addon.fem.unit_materials_and_contact import materials_of
+from mu_addon.fem.unit_materials import materials_of
 from mu_addon.meshing.mesh import LATTICE, mirror, mirror_displacement
 from mu_addon.meshing.settings import MeshSettings
 

@@ -13,7 +13,7 @@ from mu_addon.fem.model import Model
 from mu_addon.fem.newton_settings import RESOLVED_OBSTACLE_NEWTON
 from mu_addon.fem.obstacle import Obstacle
 from mu_addon.fem.rigid import Plane
-from mu_addon.fem.unit_materials_and_contact import materials_of
+from mu_addon.fem.unit_materials import materials_of
 from mu_addon.meshing.settings import MeshSettings
 
 SMALL = load_preset("mu-1.0x")

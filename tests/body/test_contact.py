@@ -17,7 +17,7 @@ from mu_addon.fem.outer_faces import outer_faces
 from mu_addon.fem.rigid import Plane, Pose, Sphere
 from mu_addon.fem.state import rest
 from mu_addon.fem.time_stepping import simulate_in_time
-from mu_addon.fem.unit_materials_and_contact import materials_of
+from mu_addon.fem.unit_materials import materials_of
 from mu_addon.homogenize.cell_mesh import cell_materials
 from mu_addon.homogenize.specimen import block_specimen
 from mu_addon.meshing.mesh import LATTICE

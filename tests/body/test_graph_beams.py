@@ -27,7 +27,7 @@ from mu_addon.fem.equilibrium import Equilibrium
 from mu_addon.fem.materials import Materials
 from mu_addon.fem.model import Model
 from mu_addon.fem.stress import of_sections, peak_stretch
-from mu_addon.fem.unit_materials_and_contact import materials_of
+from mu_addon.fem.unit_materials import materials_of
 from mu_addon.meshing.mesh import LATTICE
 from mu_addon.meshing.settings import MeshSettings
 from mu_addon.meshing.tiling import tiled

@@ -13,7 +13,7 @@ from mu_addon.body.printed_mesh import mesh_printed
 from mu_addon.design.lattice import lattice_of
 from mu_addon.design.parameters import load_preset
 from mu_addon.fem.model import Model
-from mu_addon.fem.unit_materials_and_contact import materials_of
+from mu_addon.fem.unit_materials import materials_of
 from mu_addon.meshing.settings import MeshSettings
 from tests.design import kinds
 

@@ -18,7 +18,7 @@ from mu_addon.fem.dead_loads import gravity
 from mu_addon.fem.equilibrium import Equilibrium
 from mu_addon.fem.model import Model
 from mu_addon.fem.self_contact import SelfContact
-from mu_addon.fem.unit_materials_and_contact import materials_of
+from mu_addon.fem.unit_materials import materials_of
 from mu_addon.meshing.mesh import LATTICE, MEMBRANE, boundary_faces, mirror, mirror_displacement
 from mu_addon.meshing.settings import MeshSettings
 

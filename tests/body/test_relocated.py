@@ -10,7 +10,7 @@ from mu_addon.errors import InputError
 from mu_addon.fem.model import Model
 from mu_addon.fem.moved_nodes import relocated
 from mu_addon.fem.state import rest
-from mu_addon.fem.unit_materials_and_contact import materials_of
+from mu_addon.fem.unit_materials import materials_of
 from mu_addon.meshing.settings import MeshSettings
 
 UNIT = Unit().evolve(count=3)

@@ -15,7 +15,7 @@ from mu_addon.fem.kinematics import probe
 from mu_addon.fem.model import Model
 from mu_addon.fem.newton_settings import RESOLVED_NEWTON
 from mu_addon.fem.trajectory import simulate, whole_body
-from mu_addon.fem.unit_materials_and_contact import materials_of
+from mu_addon.fem.unit_materials import materials_of
 from mu_addon.meshing.settings import MeshSettings
 from mu_addon.placement.graph import lattice_graph
 from mu_addon.placement.sensitivity_map import loaded

@@ -23,7 +23,7 @@ from mu_addon.fem.model import Model
 from mu_addon.fem.newton_settings import RESOLVED_NEWTON
 from mu_addon.fem.self_contact import SelfContact
 from mu_addon.fem.state import State
-from mu_addon.fem.unit_materials_and_contact import materials_of
+from mu_addon.fem.unit_materials import materials_of
 from mu_addon.meshing.mesh import mirror
 from mu_addon.meshing.settings import MeshSettings
 

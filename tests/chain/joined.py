@@ -19,7 +19,7 @@ from mu_addon.fem.laws import NeoHooke
 from mu_addon.fem.materials import Layer, Materials
 from mu_addon.fem.model import Model
 from mu_addon.fem.state import State
-from mu_addon.fem.unit_materials_and_contact import materials_of
+from mu_addon.fem.unit_materials import materials_of
 from mu_addon.meshing.mesh import LATTICE, TET_EDGES, Mesh
 
 if TYPE_CHECKING:

@@ -15,7 +15,7 @@ from mu_addon.design.parameters import Chambers, Envelope, Printing, Unit, Waveg
 from mu_addon.design.printed import as_printed, skin_stiffening
 from mu_addon.design.profile import cavity_radius, cavity_volume, outer_radius, outer_slope, outer_volume
 from mu_addon.errors import InputError
-from mu_addon.fem.unit_materials_and_contact import materials_of
+from mu_addon.fem.unit_materials import materials_of
 from mu_addon.meshing.mesh import LATTICE, MEMBRANE
 
 from .units import units

@@ -29,7 +29,7 @@ from mu_addon.evidence.unit_run import _from_beside
 from mu_addon.fem.clogged import CloggedModel
 from mu_addon.fem.equilibrium import Equilibrium
 from mu_addon.fem.model import Model
-from mu_addon.fem.unit_materials_and_contact import materials_of
+from mu_addon.fem.unit_materials import materials_of
 from mu_addon.measured.pose import X, at_rest
 from mu_addon.meshing.settings import MeshSettings
 from tests.evidence import analytic

@@ -12,7 +12,7 @@ from mu_addon.body.printed_mesh import mesh_printed
 from mu_addon.design.parameters import load_preset
 from mu_addon.fem.state import State
 from mu_addon.fem.trajectory import Trajectory
-from mu_addon.fem.unit_materials_and_contact import materials_of
+from mu_addon.fem.unit_materials import materials_of
 from mu_addon.meshing.settings import MeshSettings
 from mu_addon.report.motion_files import write_model_a
 from mu_addon.simulate_and_place import unfinished_motion_parts

@@ -15,7 +15,7 @@ from mu_addon.design.parameters import to_toml
 from mu_addon.design.surface import bad_edges, stl_surface
 from mu_addon.errors import InputError
 from mu_addon.fem.protocol import Protocol
-from mu_addon.fem.unit_materials_and_contact import materials_of
+from mu_addon.fem.unit_materials import materials_of
 from mu_addon.files import read_npz
 from mu_addon.grasp import NAMES, Contact, Cube, Phases, grasp, read_phases, shipped_phases
 from mu_addon.report.grasp_files import even, write_halves

@@ -18,7 +18,7 @@ from mu_addon.errors import InputError
 from mu_addon.fem.protocol import Protocol
 from mu_addon.fem.state import rest
 from mu_addon.fem.trajectory import Trajectory
-from mu_addon.fem.unit_materials_and_contact import materials_of
+from mu_addon.fem.unit_materials import materials_of
 from mu_addon.live_bending import known, requests, run
 from mu_addon.live_bending.run import LiveBending
 from mu_addon.meshing.settings import MeshSettings

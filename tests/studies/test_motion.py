@@ -16,7 +16,7 @@ from mu_addon.errors import InputError
 from mu_addon.fem.kinematics import probe
 from mu_addon.fem.state import State
 from mu_addon.fem.trajectory import whole_body
-from mu_addon.fem.unit_materials_and_contact import materials_of
+from mu_addon.fem.unit_materials import materials_of
 from mu_addon.files import write_npz
 from mu_addon.meshing.mesh import mirror
 from mu_addon.meshing.quality import element_volumes

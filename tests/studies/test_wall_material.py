@@ -22,7 +22,7 @@ from mu_addon.errors import InputError
 from mu_addon.fem.laws import Friction, Layered, NeoHooke, OgdenRoxburgh, Prony, Yeoh
 from mu_addon.fem.materials import Materials
 from mu_addon.fem.protocol import Protocol
-from mu_addon.fem.unit_materials_and_contact import materials_of
+from mu_addon.fem.unit_materials import materials_of
 from mu_addon.materials.coupon import Coupon
 from mu_addon.materials.fit import POISSON, fit_coupons
 from mu_addon.materials.law_forms import FORMS

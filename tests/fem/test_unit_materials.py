@@ -7,7 +7,7 @@ from mu_addon.body.printed_mesh import mesh_printed
 from mu_addon.design.grading import Grading
 from mu_addon.design.parameters import load_preset
 from mu_addon.fem.laws import NeoHooke
-from mu_addon.fem.unit_materials_and_contact import materials_of
+from mu_addon.fem.unit_materials import materials_of
 from mu_addon.meshing.settings import MeshSettings
 
 UNIT = load_preset("mu-1.0x")

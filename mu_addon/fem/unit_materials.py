@@ -1,4 +1,4 @@
-"""Materials and self-contact of a unit's mesh."""
+"""Materials of a unit's mesh."""
 
 from __future__ import annotations
 
@@ -20,16 +20,12 @@ if TYPE_CHECKING:
     from ..design.dimensions import Dimensions
     from ..design.parameters import Unit
     from ..meshing.mesh import Mesh
-    from .self_contact import SelfContact
 
 
 # An element of a strut is divided this often along each edge to tell how much of it is skin.
 _SKIN_STEPS = 4
 # Of a graded strut's diameter, logarithmic, in which depths below its surface are looked up.
 _FACTOR = 0.02
-# Of self-contact: the gap over the wall's thickness, and the barrier's stiffness over the resin's modulus;
-# docs/engineering/method.md says what they move.
-_GAP_SHARE, _BARRIER_SHARE = 1 / 9, 0.04
 
 
 def materials_of(unit: Unit, mesh: Mesh) -> Materials:
@@ -82,21 +78,3 @@ def _depths(d: Dimensions, points: Array, corner: Array) -> Array:
         own = steps == step
         found[own] = depth_below_surface(StrutCell(d.kind, d.cell, *radii), points[own] + corner)
     return found
-
-
-def self_contact_of(unit: Unit, mesh: Mesh, friction: float = 0.0) -> SelfContact:
-    """Self-contact of a resolved mesh's walls and struts, with friction between them. Raises InputError."""
-    from .self_contact import SelfContact
-
-    return SelfContact(mesh, *_barrier_of(unit), friction)
-
-
-def relocated_contact(contact: SelfContact, unit: Unit, mesh: Mesh) -> SelfContact:
-    """Contact of a unit whose mesh is that of another with moved nodes; see `self_contact_of`."""
-    return contact.relocated(mesh, *_barrier_of(unit))
-
-
-def _barrier_of(unit: Unit) -> tuple[float, float]:
-    """Gap in mm and stiffness in MPa of a unit's contact with itself."""
-    resin_MPa = in_MPa(unit.material.membrane_modulus_kPa)
-    return _GAP_SHARE * unit.printed.thinnest_wall, _BARRIER_SHARE * resin_MPa
