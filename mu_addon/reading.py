@@ -1,7 +1,7 @@
 """Files, TOML and JSON from anywhere, read so that any content ends in a clear error.
 
 Every reader of the program takes its text, TOML and JSON from here: a pipe or a device does not hang it, and
-endless brackets or digits do not exhaust it.
+endless brackets or digits do not exhaust it. Tables, keys and values of TOML are judged by `toml_reader`.
 """
 
 from __future__ import annotations

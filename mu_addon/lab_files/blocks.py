@@ -20,8 +20,9 @@ from ..table_cells.clock import clock, is_clock
 from ..table_cells.dialect import BRACKET, Row, split
 from ..table_cells.notation import is_like_number, judged, unit_behind
 from .cells import ReadColumn, in_one_notation, read_column
-from .columns import Column, column, is_unit, plain, shown
+from .columns import Column, column, shown
 from .sheet import Sheet
+from .units import is_unit, plain
 
 # A line that names the specimen whose table follows, such as "Specimen 2".
 _SPECIMEN = re.compile(

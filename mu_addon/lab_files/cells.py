@@ -12,8 +12,8 @@ from ..arrays import Array
 from ..errors import InputError
 from ..table_cells.clock import clock, is_clock
 from ..table_cells.notation import DECIMALS, OTHER, Numbers, judged, number, unit_behind, with_units
-from .columns import unit_of
 from .sheet import Sheet
+from .units import unit_of
 
 # Cells with the other decimal sign from which these alternate; fewer are damaged cells.
 _ALTERNATING = 3

@@ -7,8 +7,8 @@ import re
 from collections.abc import Iterator, Mapping
 
 from ..table_cells.notation import number
-from .columns import unit_of
 from .proposal import Proposal
+from .units import unit_of
 
 _LENGTH = re.compile(
     r"gau?ge length|dimension\W+length|grip separation|messlange|einspannlange|anfangslange|initial length|"

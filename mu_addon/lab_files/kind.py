@@ -10,9 +10,9 @@ import numpy as np
 
 from ..arrays import Array
 from ..measured.kinds import KINDS, named
-from .columns import READ_IN, plain, unit_of
 from .proposal import NoExperiment, Proposal
 from .quantities import ask_column, may_hold
+from .units import READ_IN, plain, unit_of
 
 _TENSION = re.compile(r"tensil|tension test|zugversuch|\bzug\b|traction|trazione|traccion|rozciagan")
 _COMPRESSION = re.compile(r"compress|druckversuch|stauch|druckspannung|\bdruck\b|schiacc|sciskan")

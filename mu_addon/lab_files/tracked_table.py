@@ -22,7 +22,8 @@ from ..measured.video import Tracks
 from ..reading import require_rows, text_in
 from ..table_cells.notation import is_like_number
 from ..table_cells.own_tables import own_lines, own_rows, own_text
-from .columns import column, unit_of
+from .columns import column
+from .units import unit_of
 
 Line = tuple[int, str]
 Cells = tuple[int, list[str]]

@@ -1,4 +1,4 @@
-"""Candidate paths, and the deviation of a unit with a sensor along one (Algorithm 1 of the paper)."""
+"""Candidate paths: what the ranking (Algorithm 1 of the paper) chooses from."""
 
 from __future__ import annotations
 
@@ -7,7 +7,6 @@ from typing import Any
 import attrs
 
 from ..arrays import Array
-from .deviation import Deviation, centreline, centreline_deviation
 
 
 @attrs.frozen(eq=False)
@@ -36,19 +35,3 @@ def candidate_paths(anchors: Array, windows: Any) -> list[Candidate]:
     ('alpha1', (3, 3))
     """
     return [Candidate(w.name, w.start, anchors[w.start - 1 : w.start - 1 + w.length]) for w in windows]
-
-
-@attrs.frozen(eq=False)
-class Evaluation:
-    """A candidate's deviation from Model A."""
-
-    name: str
-    deviation: Deviation
-
-
-def evaluation(name: str, moved: Array, baseline: Array, stations: int) -> Evaluation:
-    """Deviation of one candidate's monitored points (k, p, 3) in mm from Model A's at the same k instants.
-
-    moved, baseline: the points with and without the sensor; stations: number of uniform arc lengths compared.
-    """
-    return Evaluation(name, centreline_deviation(centreline(moved, stations), centreline(baseline, stations)))

@@ -5,7 +5,7 @@ from typing import TYPE_CHECKING
 from ..lazy import public_face
 
 if TYPE_CHECKING:
-    from .candidates import (
+    from .compared_pressures import (
         Array,
         Comparison,
         Followed,
@@ -25,7 +25,6 @@ if TYPE_CHECKING:
     from .motion import (
         MotionTables,
         StateFields,
-        mesh_of,
         motion_in_time,
         motion_of,
         reached_of,

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from functools import lru_cache
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -12,14 +12,10 @@ import attrs
 import numpy as np
 
 from ..arrays import Array
-from ..body.printed_mesh import mesh_printed
-from ..design.body import Body
-from ..design.parameters import Unit
 from ..design.quantity import in_MPa
 from ..fem.state import State, rest
 from ..fem.trajectory import Trajectory
 from ..meshing.mesh import Mesh
-from ..meshing.settings import MeshSettings
 from ..report.motion_files import Surface, SurfaceFields, surfaces_of
 from .mechanics import Mechanics, Samples
 from .model_a import InTime
@@ -28,18 +24,6 @@ from .motion_tables import Reached, Row, SelfContactRows, self_contact_rows, str
 
 if TYPE_CHECKING:
     from ..fem.equilibrium import Equilibrium
-
-
-def mesh_of(
-    shape: Unit,
-    has_memory: bool,
-    settings: MeshSettings,
-    body: Body | None,
-    cache: Path,
-    on_progress: Callable[[float], None],
-) -> Mesh:
-    """Analysis mesh of a unit's shape; a wall with memory has no beams. InputError, MeshingError."""
-    return mesh_printed(shape, settings, lambda _, share: on_progress(share), cache, body, solid=has_memory)
 
 
 def state_after(equilibrium: Equilibrium, pressure_kPa: float, earlier: Sequence[State]) -> State:

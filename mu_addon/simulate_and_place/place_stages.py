@@ -26,7 +26,7 @@ from ..placement.graph import Limits
 from ..placement.search import Search, searching
 from ..report.results import LatticePath, Signals
 from ..run.cache import Cache
-from .candidates import (
+from .compared_pressures import (
     Comparison,
     PathCheck,
     Solved,
@@ -177,9 +177,7 @@ def uncertainty(
         if instants is not None and moved:
             motion = motion_in_time(mesh, samples, instants)
             found, _ = evaluated_in_time(tuple(moved), moved, motion, anchors, stations)
-            return Uncertainty(
-                mesh_change_mm(ranking.evaluations, [*found.values()], range(len(samples.time_s)))
-            )
+            return Uncertainty(mesh_change_mm(ranking.deviations, found, range(len(samples.time_s))))
         known = extremes(samples.pressure_kPa[ranking.compared])
         at = [int(np.flatnonzero(samples.pressure_kPa == p)[0]) for p in known]
         few = Samples(np.arange(len(known), dtype=float), known, known)
@@ -192,7 +190,7 @@ def uncertainty(
         standing.compared_kPa = sorted(reached)
         motion = motion_of(mesh, few, states or {})
         found = evaluated(Comparison(names, few), standing, PathCheck(), motion, anchors, stations)
-        return Uncertainty(mesh_change_mm(ranking.evaluations, [*found.values()], at))
+        return Uncertainty(mesh_change_mm(ranking.deviations, found, at))
     except ConvergenceError as error:
         return Uncertainty(None, f"The mesh uncertainty is not known: on the coarser mesh, {error.what}.")
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from typing import Any
 
 import attrs
@@ -10,8 +10,8 @@ import numpy as np
 
 from ..arrays import Array
 from ..errors import ConvergenceError
-from ..placement.candidates import Candidate, Evaluation
-from ..placement.deviation import rank
+from ..placement.candidates import Candidate
+from ..placement.deviation import Deviation, rank
 
 COLUMNS = [
     "path",
@@ -28,13 +28,13 @@ COLUMNS = [
 
 @attrs.frozen(eq=False)
 class Ranking:
-    """Evaluations of candidates by path, and the mesh uncertainty of J_hat in mm; None: not known.
+    """Deviations of candidates by path, and the mesh uncertainty of J_hat in mm; None: not known.
 
     at_least_mm: lower bound of J_hat of paths that were not solved further, since they cannot be the best;
     not_reached: pressures or instants that are not compared, and why.
     """
 
-    evaluations: dict[str, Evaluation] = attrs.field(factory=dict)
+    deviations: dict[str, Deviation] = attrs.field(factory=dict)
     uncertainty_mm: float | None = None
     at_least_mm: dict[str, float] = attrs.field(factory=dict)
     not_reached: tuple[str, ...] = ()
@@ -42,12 +42,12 @@ class Ranking:
     @property
     def compared(self) -> Array:
         """True for each instant (k,) at which all paths are compared."""
-        return np.isfinite([e.deviation.over_time for e in self.evaluations.values()]).all(axis=0)
+        return np.isfinite([d.over_time for d in self.deviations.values()]).all(axis=0)
 
     @property
     def J_hat_mm(self) -> dict[str, float]:
         """J_hat in mm by path."""
-        return {name: e.deviation.J_hat for name, e in self.evaluations.items()}
+        return {name: d.J_hat for name, d in self.deviations.items()}
 
     @property
     def chosen(self) -> str:
@@ -75,13 +75,12 @@ class Ranking:
 
     def rows(self, paths: Sequence[Candidate]) -> list[tuple[Any, ...]]:
         """Rows of deviation.csv."""
-        found = {c.name: self.evaluations[c.name].deviation for c in paths if c.name in self.evaluations}
         # One uncertainty for all: the largest change of a path's J_hat on another mesh.
         mesh = "" if self.uncertainty_mm is None else f"{self.uncertainty_mm:.3g}"
-        ties = {name: "yes" if name in self.tied else "no" for name in found} if mesh else {}
+        ties = {name: "yes" if name in self.tied else "no" for name in self.deviations} if mesh else {}
         rows: list[tuple[Any, ...]] = []
         for c in paths:
-            if (d := found.get(c.name)) is not None:
+            if (d := self.deviations.get(c.name)) is not None:
                 figures = f"{d.J_hat:.9g}", f"{d.J_cont:.9g}", self.rank.get(c.name, ""), mesh
                 rows.append((c.name, c.start, c.length, *figures, ties.get(c.name, ""), ""))
             else:
@@ -91,7 +90,7 @@ class Ranking:
 
 
 def mesh_change_mm(
-    fine: dict[str, Evaluation], coarse: Sequence[Evaluation], instants: Sequence[int]
+    fine: Mapping[str, Deviation], coarse: Mapping[str, Deviation], instants: Sequence[int]
 ) -> float:
     """Largest change of any path's J_hat in mm on a coarser mesh.
 
@@ -99,9 +98,9 @@ def mesh_change_mm(
     there is used as that of J_hat. Raises ConvergenceError if none of them is compared on both.
     """
     change = 0.0
-    for found in coarse:
-        deviation = fine[found.name].deviation
-        both = np.array([deviation.delta[list(instants)], found.deviation.delta])
+    for name, found in coarse.items():
+        deviation = fine[name]
+        both = np.array([deviation.delta[list(instants)], found.delta])
         there, coarser = both[:, np.isfinite(both).all(axis=(0, 2))].reshape(2, -1)
         if not len(there):
             raise ConvergenceError("no pressure is compared on both meshes")

@@ -36,8 +36,8 @@ from ..run.parts import (
     recorded,
 )
 from . import graph_search, light
-from .candidates import PathCheck, Standing
 from .charts import delta_name, delta_picture, front_chart, response_chart
+from .compared_pressures import PathCheck, Standing
 from .graph_search import Predicted, Sensitivity, unstable_at
 from .path_motion import PathMotion
 from .place_stages import Light, NamedMotion, SearchOutcome, Uncertainty
@@ -58,7 +58,7 @@ def result_of(ranking: Ranking) -> RankingResult:
     """A ranking as charts take it, of the solved paths."""
     from ..placement.deviation import rank
 
-    found = [e.deviation for e in ranking.evaluations.values()]
+    found = [*ranking.deviations.values()]
     j_hat = np.array([d.J_hat for d in found])
     return RankingResult(
         delta=np.array([d.delta for d in found]),
@@ -73,7 +73,7 @@ def result_of(ranking: Ranking) -> RankingResult:
 
 
 def _solved(study: Any, ranking: Ranking) -> list[ShownPath]:
-    return [path for path in paths_of(study) if path.name in ranking.evaluations]
+    return [path for path in paths_of(study) if path.name in ranking.deviations]
 
 
 def answer_parts(
@@ -183,14 +183,14 @@ def ranking_parts(study: Any, ranking: Ranking, motion: Trajectory) -> Iterator[
     yield csv("deviation.csv", COLUMNS, ranking.rows(study.candidate_paths))
     arrays = {
         "delta_mm": result.delta,
-        "path": np.array([*ranking.evaluations]),
+        "path": np.array([*ranking.deviations]),
         "time_s": study.samples.time_s,
         "pressure_kPa": study.samples.supplied_kPa,
         "station": np.linspace(0, 1, study.stations),
     }
     yield File("delta.npz", lambda path: write_npz(path, arrays), of=arrays)
     yield recorded("J_hat_mm", ranking.J_hat_mm)
-    yield recorded("J_cont_mm", {n: e.deviation.J_cont for n, e in ranking.evaluations.items()})
+    yield recorded("J_cont_mm", {n: d.J_cont for n, d in ranking.deviations.items()})
     yield recorded("J_hat_at_least_mm", ranking.at_least_mm)
     yield recorded("chosen", ranking.chosen)
     yield recorded("mesh_uncertainty_mm", ranking.uncertainty_mm)
@@ -226,7 +226,7 @@ def ranking_parts(study: Any, ranking: Ranking, motion: Trajectory) -> Iterator[
         if path.name in ranking.at_least_mm:
             figures = ["", f"≥ {ranking.at_least_mm[path.name]:.4f}", ""]
         else:
-            d = ranking.evaluations[path.name].deviation
+            d = ranking.deviations[path.name]
             figures = [str(ranks.get(path.name, "")), f"{d.J_hat:.4f}", f"{d.J_cont:.4f}"]
         rows.append([label(path.name), path.anchors, *figures])
     best = [n for n, path in enumerate(paths) if path.name == ranking.chosen]
@@ -238,11 +238,11 @@ def ranking_parts(study: Any, ranking: Ranking, motion: Trajectory) -> Iterator[
 
 def _panel_pictures(ranking: Ranking, motion: Trajectory) -> list[tuple[str, Picture]]:
     """Pictures of the paths' deviations for panels."""
-    found = ranking.evaluations.values()
-    top = max((float(np.nanmax(e.deviation.delta)) for e in found), default=0.0)
+    found = ranking.deviations
+    top = max((float(np.nanmax(d.delta)) for d in found.values()), default=0.0)
     return [
-        (f"{FOLDER}/{delta_name(e.name)}", delta_picture(e.name, e.deviation.delta, motion.time_s, top))
-        for e in found
+        (f"{FOLDER}/{delta_name(name)}", delta_picture(name, d.delta, motion.time_s, top))
+        for name, d in found.items()
     ]
 
 
@@ -460,7 +460,7 @@ def path_motion_parts(motions: Mapping[str, PathMotion], best: NamedMotion | Non
 
 def heatmap_parts(ranking: Ranking) -> Iterator[Part]:
     """A map of the deviation over length and time for each path."""
-    found = {name: e.deviation for name, e in ranking.evaluations.items()}
+    found = ranking.deviations
     top = max(float(np.nanmax(d.delta)) for d in found.values())
     partly = "" if ranking.compared.all() else " Empty rows are not compared."
     yield Sentence(

@@ -43,7 +43,7 @@ def timed(title: str, of: str = "", **more: Any) -> Any:
     """A stage with the expected seconds of that title, or of another one; more: of the `Stage`."""
 
     def seconds(study: Any) -> float:
-        from ..simulate_and_place.expected import seconds
+        from ..simulate_and_place.expected_seconds import seconds
 
         return seconds(study, of or title)
 
@@ -265,7 +265,7 @@ class UnitMotion(Study):
 
     def bytes_needed(self) -> int:
         """Room that a run takes on the disk at most."""
-        from ..simulate_and_place.expected import expected_bytes
+        from ..simulate_and_place.expected_seconds import expected_bytes
 
         return expected_bytes(self)
 
@@ -306,7 +306,11 @@ class UnitMotion(Study):
         tell: Tell,
     ) -> meshing.Mesh:
         """The analysis mesh; cells of some lattices have no seed, so that it is kept."""
-        found = core.mesh_of(shape, has_memory, meshed_as, body, tell.cache, tell)
+        from ..body import mesh_printed
+
+        found = mesh_printed(
+            shape, meshed_as, lambda _, share: tell(share), tell.cache, body, solid=has_memory
+        )
         tell.made(f"{len(found.nodes)} nodes and {len(found.tets)} elements")
         return found
 

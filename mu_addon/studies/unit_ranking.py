@@ -247,7 +247,7 @@ class UnitStudy(UnitMotion):
 
     def detail(self) -> str:
         """What its stages' seconds depend on."""
-        from ..simulate_and_place.expected import Size
+        from ..simulate_and_place.expected_seconds import Size
 
         return str(Size.of(self)) if "simulate" in self.stages else self.stages[-1]
 
@@ -440,7 +440,11 @@ class UnitStudy(UnitMotion):
         tell: Tell,
     ) -> meshing.Mesh:
         """A coarser analysis mesh."""
-        return core.mesh_of(shape, has_memory, checked_as, body, tell.cache, tell)
+        from ..body import mesh_printed
+
+        return mesh_printed(
+            shape, checked_as, lambda _, share: tell(share), tell.cache, body, solid=has_memory
+        )
 
     @intermediate()
     def coarse_equilibrium(self, coarse_mesh: meshing.Mesh, mechanics: core.Mechanics) -> fem.Equilibrium:

@@ -4,8 +4,9 @@ import numpy as np
 import pytest
 
 from mu_addon.lab_files import blocks
-from mu_addon.lab_files.columns import column, unit_of
+from mu_addon.lab_files.columns import column
 from mu_addon.lab_files.source import sheet_of_text
+from mu_addon.lab_files.units import unit_of
 
 from . import exports
 

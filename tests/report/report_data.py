@@ -6,7 +6,6 @@ import numpy as np
 import trimesh
 
 from mu_addon.design.parameters import load_preset
-from mu_addon.placement.candidates import Evaluation
 from mu_addon.placement.deviation import deviation_of
 from mu_addon.report.results import Path, SideView
 from mu_addon.report.study_report import page_of
@@ -48,7 +47,7 @@ def ranking(without=(), missed=slice(0), uncertainty_mm=0.03, **more):
         if path.name not in without:
             values = delta(path, mean)
             values[missed] = np.nan
-            found[path.name] = Evaluation(path.name, deviation_of(values))
+            found[path.name] = deviation_of(values)
     return Ranking(found, uncertainty_mm, **more)
 
 

@@ -2,17 +2,15 @@
 
 from types import SimpleNamespace
 
-import attrs
 import numpy as np
 import pytest
 
 from mu_addon.design.anchors import anchor_points
 from mu_addon.errors import ConvergenceError
-from mu_addon.placement.candidates import Evaluation
 from mu_addon.placement.deviation import deviation_of
 from mu_addon.placement.deviation_bounds import Contest
-from mu_addon.simulate_and_place import candidates
-from mu_addon.simulate_and_place.candidates import (
+from mu_addon.simulate_and_place import compared_pressures
+from mu_addon.simulate_and_place.compared_pressures import (
     Comparison,
     evaluated,
     evaluated_in_time,
@@ -60,8 +58,7 @@ def ranked(contest=None, count=3, pressures=PRESSURES, before=None, begin=False)
     check, along = answered(
         following(compared, found), lambda name, at: followed(sensors, names.index(name), at)
     )
-    every = evaluated(compared, found, check, motion, ANCHORS, STATIONS)
-    deviations = {name: one.deviation for name, one in every.items()}
+    deviations = evaluated(compared, found, check, motion, ANCHORS, STATIONS)
     return SimpleNamespace(
         compared=compared, standing=found, check=check, deviations=deviations, asked=asked, along=along
     )
@@ -212,7 +209,7 @@ def test_a_wider_contest_leaves_the_first_as_it_was():
 
 
 def test_many_pressures_are_interpolated_and_nothing_is_left_out(monkeypatch):
-    monkeypatch.setattr(candidates, "FEW_PRESSURES", 3)
+    monkeypatch.setattr(compared_pressures, "FEW_PRESSURES", 3)
     found = contested(Contest(1))
     assert (len(found.deviations), found.standing.at_least_mm) == (10, {})
 
@@ -258,27 +255,24 @@ def test_with_history_instants_count_until_the_first_that_a_path_does_not_reach(
     found, not_reached = evaluated_in_time([*moved], moved, motion, ANCHORS, STATIONS)
     assert not_reached == ["from 4 s on (path2: no equilibrium at 20 kPa)"]
     for one in found.values():
-        assert np.isfinite(one.deviation.over_time).tolist() == [True, True, True, True, False]
+        assert np.isfinite(one.over_time).tolist() == [True, True, True, True, False]
     with pytest.raises(ConvergenceError, match="not all paths are compared from 1 s on"):
         evaluated_in_time([*moved], moved | {"path1": moved["path1"][:1]}, motion, ANCHORS, STATIONS)
 
 
 def test_a_mesh_check_compares_the_pressures_that_both_meshes_reach():
     fine, coarse = (
-        Evaluation("alpha1", deviation_of(np.outer(of_time, np.ones(3))))
-        for of_time in ([0.1, 0.3, 0.4], [np.nan, 0.36])
+        deviation_of(np.outer(of_time, np.ones(3))) for of_time in ([0.1, 0.3, 0.4], [np.nan, 0.36])
     )
-    change = mesh_change_mm({"alpha1": fine}, [coarse], [0, 1])
+    change = mesh_change_mm({"alpha1": fine}, {"alpha1": coarse}, [0, 1])
     # 0.3 to 0.36 at the one pressure of both, of a mean deviation of 0.8 / 3.
-    assert change == pytest.approx(0.06 * fine.deviation.J_hat / 0.3)
-    nowhere = {"alpha1": attrs.evolve(fine, deviation=coarse.deviation)}
+    assert change == pytest.approx(0.06 * fine.J_hat / 0.3)
     with pytest.raises(ConvergenceError, match="on both meshes"):
-        mesh_change_mm(nowhere, [fine], [0, 0, 0])
+        mesh_change_mm({"alpha1": coarse}, {"alpha1": fine}, [0, 0, 0])
 
 
 def test_the_mesh_check_takes_the_paths_that_disturb_least():
     deviations = {
-        name: Evaluation(name, deviation_of(np.full((2, 3), mm)))
-        for name, mm in (("a", 0.3), ("b", 0.1), ("c", 0.2))
+        name: deviation_of(np.full((2, 3), mm)) for name, mm in (("a", 0.3), ("b", 0.1), ("c", 0.2))
     }
     assert Ranking(deviations).best(2) == ["b", "c"]

@@ -35,8 +35,8 @@ from mu_addon.report.motion_files import (
     write_sensitivity,
 )
 from mu_addon.report.pc2 import read_pc2, write_pc2
-from mu_addon.simulate_and_place.candidates import solved
 from mu_addon.simulate_and_place.charts import angle_picture, delta_picture
+from mu_addon.simulate_and_place.compared_pressures import solved
 from mu_addon.simulate_and_place.path_motion import PathMotions
 from mu_addon.studies.unit_ranking import UnitStudy
 

@@ -4,7 +4,7 @@ import attrs
 import pytest
 
 from mu_addon.design.parameters import Unit
-from mu_addon.simulate_and_place.expected import SUCTION, WAY_CROSSING, WAY_TOUCHING, Size, work
+from mu_addon.simulate_and_place.expected_seconds import SUCTION, WAY_CROSSING, WAY_TOUCHING, Size, work
 from mu_addon.studies.unit_ranking import UnitStudy
 
 

@@ -11,7 +11,6 @@ from mu_addon.design.parameters import load_preset
 from mu_addon.errors import InputError
 from mu_addon.fem.protocol import Protocol
 from mu_addon.meshing.settings import MeshSettings
-from mu_addon.placement.candidates import Evaluation
 from mu_addon.placement.deviation import deviation_of
 from mu_addon.placement.deviation_bounds import Contest
 from mu_addon.run.parts import Sentence
@@ -83,7 +82,7 @@ def test_its_deviation_is_a_bound_of_the_full_one():
 def test_its_figures_say_what_they_leave_out():
     study, delta = quick(FULL), np.full((13, 51), 0.3)
     assert [part.value for part in study.quickly()] == [LEFT_OUT]
-    ranking = Ranking({f"alpha{n}": Evaluation(f"alpha{n}", deviation_of(n * delta)) for n in range(1, 11)})
+    ranking = Ranking({f"alpha{n}": deviation_of(n * delta) for n in range(1, 11)})
     answer = study.answer(SimpleNamespace(vertices=np.zeros((1, 3))), ranking)
     told = [part.text for part in answer if isinstance(part, Sentence)]
     assert any(text.endswith(f"0.300 mm ({LEFT_OUT}).") for text in told), "in the report"

@@ -20,7 +20,7 @@ from mu_addon.report.motion_files import read_motion
 from mu_addon.run.context import RunContext
 from mu_addon.run.kept_results import Results
 from mu_addon.run.progress import Progress
-from mu_addon.simulate_and_place.expected import BYTES, BYTES_A_NODE, expected_nodes
+from mu_addon.simulate_and_place.expected_seconds import BYTES, BYTES_A_NODE, expected_nodes
 from mu_addon.studies.starting import start
 from mu_addon.studies.unit_ranking import UnitStudy
 from tests.design.kinds import custom, octet

@@ -8,8 +8,9 @@ import attrs
 
 from ...table_cells.dialect import Row
 from ...table_cells.notation import number
-from ..columns import column, is_unit
+from ..columns import column
 from ..sheet import Content, Sheet
+from ..units import is_unit
 from . import text_table
 
 TEXT = 1

@@ -1,4 +1,4 @@
-"""A study's candidate paths: what each is solved at, its solution there, and all of them against Model A."""
+"""Pressures at which candidate paths are solved and compared, and each one's deviation from Model A there."""
 
 from __future__ import annotations
 
@@ -19,8 +19,8 @@ from ..fem.state import State
 from ..fem.trajectory import Trajectory
 from ..generators import value_of
 from ..meshing.mesh import Mesh
-from ..placement.candidates import Candidate, Evaluation, evaluation
-from ..placement.deviation import centreline
+from ..placement.candidates import Candidate
+from ..placement.deviation import Deviation, centreline, centreline_deviation
 from ..placement.deviation_bounds import Contest, first_and_rest, lower_bounds
 from ..placement.sampling import between, relative_error, solution_order
 from .mechanics import Mechanics, Samples
@@ -373,8 +373,8 @@ def evaluated(
     motion: Trajectory,
     anchors: Array,
     stations: int,
-) -> dict[str, Evaluation]:
-    """Evaluation against Model A's motion of every candidate solved at all pressures, by name.
+) -> dict[str, Deviation]:
+    """Deviation from Model A's motion of every candidate solved at all pressures, by name.
 
     anchors (p, 3) in mm. Where candidates' paths lead elsewhere than Model A's states, `known` is changed to
     what they lead to.
@@ -391,7 +391,10 @@ def evaluated(
     difference[~np.isin(distinct, known.compared_kPa)] = np.nan
     baseline = baseline_of(motion, anchors)
     moved = baseline[:, None] + motion.of_time(difference)
-    return {name: evaluation(name, moved[:, n], baseline, stations) for n, name in enumerate(names)}
+    line = centreline(baseline, stations)
+    return {
+        name: centreline_deviation(centreline(moved[:, n], stations), line) for n, name in enumerate(names)
+    }
 
 
 def baseline_of(motion: Trajectory, anchors: Array) -> Array:
@@ -402,8 +405,8 @@ def baseline_of(motion: Trajectory, anchors: Array) -> Array:
 
 def evaluated_in_time(
     names: Sequence[str], moved: Mapping[str, Array], motion: Trajectory, anchors: Array, stations: int
-) -> tuple[dict[str, Evaluation], list[str]]:
-    """Evaluation of candidates where contact or wall has history, and the instants that are not compared.
+) -> tuple[dict[str, Deviation], list[str]]:
+    """Deviation of candidates where contact or wall has history, and the instants that are not compared.
 
     moved: anchors (k, p, 3) in mm at each instant that a candidate reached. Raises ConvergenceError where no
     pressure is left to compare.
@@ -417,11 +420,11 @@ def evaluated_in_time(
         if not pressure[:count].any():
             raise ConvergenceError(f"not all paths are compared {not_reached[0]}", first, LOWER)
     baseline = baseline_of(motion, anchors)
-    found = {}
+    line, found = centreline(baseline, stations), {}
     for name in names:
         own = np.full(baseline.shape, np.nan)
         own[:count] = moved[name][:count]
-        found[name] = evaluation(name, own, baseline, stations)
+        found[name] = centreline_deviation(centreline(own, stations), line)
     return found, not_reached
 
 
@@ -451,7 +454,7 @@ def deviation_alone(
         for name in ("anchors", "still", "distance_mm", "difference_mm")
     ]
     at = tuple(p for part in parts for p in part.pressure_kPa)
-    return found[compared.names[0]].deviation.J_hat, Solved(at, *every)
+    return found[compared.names[0]].J_hat, Solved(at, *every)
 
 
 def _along(compared: Comparison, known: Standing, check: PathCheck) -> None:
