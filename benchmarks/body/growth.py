@@ -66,7 +66,7 @@ def costs(unit: Unit, solid: bool, refine: float) -> list[str]:
     job = UnitStudy(unit=unit, mesh=settings, stages=("design", "simulate"), mesh_check=False)
     meshed, mesh = seconds(lambda: mesh_printed(unit, settings, solid=solid))
     model = job.mechanics.model(mesh, threads=1)
-    equilibrium = Equilibrium(model, job.materials(mesh), job.mechanics.newton)
+    equilibrium = Equilibrium(model, job.mechanics.materials(mesh), job.mechanics.newton)
     assembled, values = seconds(lambda: equilibrium.rest_tangent)
     once, _ = seconds(lambda: model.factor.factor(values))
     factorised, _ = seconds(lambda: model.factor.factor(values))

@@ -42,7 +42,7 @@ _HALVINGS = 3
 class Loss:
     """Two nominal strains, compression positive, between which an equilibrium becomes unstable.
 
-    signs: for the mirrors across x, y and z, -1 if the buckled shape breaks it.
+    signs: for the mirrors across x, y and z, True if the buckled shape breaks it.
     """
 
     before: float

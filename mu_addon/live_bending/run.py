@@ -166,7 +166,7 @@ class LiveBending:
         before = self._levels.get(refine)
         found = self._begun(study, before)
         old = {} if before is None else _carried_over(before, found)
-        body = Equilibrium(found.model, study.materials(found.mesh), NEWTON)
+        body = Equilibrium(found.model, study.mechanics.materials(found.mesh), NEWTON)
         first = round(first_kPa, 3)
         top = max(float(study.protocol.pressure_kPa.max()), first_kPa, 1.0)
         halfway = [first_kPa / 2.0] if first_kPa > in_kPa(NEWTON.max_step_MPa) and not old else []
@@ -204,14 +204,14 @@ class LiveBending:
         settings = study.meshed_as
         mesh = mesh_printed(study.unit, settings, cache=self.folder / CELLS, body=study.body)
         self._look()
-        model = study.model(mesh)
+        model = study.mechanics.model(mesh)
         model.factor = _Watched(model.factor, self._look)  # type: ignore[assignment]
         drawn = _Drawn(study, mesh, model, surfaces_of(mesh))
         return _Solved(study, drawn, mesh, model, {0.0: rest(mesh)})
 
     def _colour(self, found: _Solved) -> None:
         """Find the fields of the states that have none yet."""
-        materials = found.study.materials(found.mesh)
+        materials = found.study.mechanics.materials(found.mesh)
         for pressure, state in found.states.items():
             if pressure not in found.fields:
                 self._look()
@@ -234,7 +234,7 @@ class LiveBending:
         kPa = np.array([state.pressure_kPa for state in states])
         tip = TipSection.of(found.mesh)
         motion = Trajectory(kPa, kPa, states, np.arange(len(states)), found.mesh)
-        materials, fields = found.study.materials(found.mesh), {}
+        materials, fields = found.study.mechanics.materials(found.mesh), {}
         if found.fields.keys() >= found.states.keys():
             every = [found.fields[p] for p in sorted(found.states)]
             fields = {name: np.concatenate([one[name] for one in every]) for name in every[0]}

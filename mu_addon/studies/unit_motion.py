@@ -245,14 +245,6 @@ class UnitMotion(Study):
 
         return attrs.evolve(self.unit, name="shape", material=Material(), wall=Wall())
 
-    def materials(self, mesh: meshing.Mesh) -> fem.Materials:
-        """Materials of the unit's mesh."""
-        return self.mechanics.materials(mesh)
-
-    def model(self, mesh: meshing.Mesh) -> fem.Model:
-        """Model of the unit's mesh. Raises InputError."""
-        return self.mechanics.model(mesh)
-
     @property
     def meshed_as(self) -> meshing.MeshSettings:
         """Settings of the mesh."""

@@ -86,7 +86,7 @@ def mesh():
 
 def moved(job, mesh):
     """Model A of a job, and its angles by pressure."""
-    found = simulate(Equilibrium(job.model(mesh), job.materials(mesh), job.mechanics.newton), TIME, PRESSURE)
+    found = simulate(job.mechanics.equilibrium(mesh), TIME, PRESSURE)
     return found, np.array([bending_angle_deg(mesh, s.u) for s in found.solved])
 
 
@@ -111,22 +111,22 @@ def test_a_simulation_is_what_the_evidence_computes_of_the_same_effect(name, mes
     materials = effect.materials(base, mesh, size) if effect.materials else base
     model = effect.model(body, mesh, size) if effect.model else body.model(mesh)
     load = effect.load(body, mesh, size) if effect.load else None
-    assert job.materials(mesh).hash() == materials.hash()
-    found = job.model(mesh)
+    assert job.mechanics.materials(mesh).hash() == materials.hash()
+    found = job.mechanics.model(mesh)
     assert type(found) is type(model)
     u, data = bent(mesh, 1.0), found.parameters(materials)
     np.testing.assert_array_equal(found.residual(u, 0.01, data) if load is None else found.load,
                                   model.residual(u, 0.01, data) if load is None else load)  # fmt: skip
     assert job.mechanics.newton == body.newton(effect)
-    plain = JOB.model(mesh)
-    same = materials.hash() == JOB.materials(mesh).hash() and load is None
+    plain = JOB.mechanics.model(mesh)
+    same = materials.hash() == JOB.mechanics.materials(mesh).hash() and load is None
     assert not same or not np.array_equal(plain.residual(u, 0.01, data), found.residual(u, 0.01, data))
 
 
 def test_weight_alone_bends_a_unit_that_lies_and_none_that_hangs(mesh):
     def sag(turn):
         job = with_effects(turn, gravity=1300.0)
-        state = Equilibrium(job.model(mesh), job.materials(mesh), job.mechanics.newton).at_zero_pressure()
+        state = job.mechanics.equilibrium(mesh).at_zero_pressure()
         return bending_angle_deg(mesh, state.u)
 
     hanging, lying, turned = map(sag, (0.0, 90.0, -90.0))
@@ -138,22 +138,22 @@ def test_weight_alone_bends_a_unit_that_lies_and_none_that_hangs(mesh):
 
 def test_effects_side_by_side_are_all_in_one_body(mesh):
     job = with_effects(90.0, **SIZES)
-    assert isinstance(job.model(mesh), CloggedModel)
-    assert job.model(mesh).load is not None
-    laws = {layer.law for layer in job.materials(mesh).layers}
+    assert isinstance(job.mechanics.model(mesh), CloggedModel)
+    assert job.mechanics.model(mesh).load is not None
+    laws = {layer.law for layer in job.mechanics.materials(mesh).layers}
     assert laws == {Yeoh, Layered, Foam}
 
 
 def test_a_layered_wall_that_stiffens_does_so_in_what_of_it_is_isotropic(mesh):
     """The order in which the two are given changes nothing."""
-    one = with_effects(anisotropy=1.3, strain_stiffening=0.4).materials(mesh)
+    one = with_effects(anisotropy=1.3, strain_stiffening=0.4).mechanics.materials(mesh)
     other = attrs.evolve(
         JOB, effects=NamedEffects(named(strain_stiffening=0.4) | named(anisotropy=1.3))
-    ).materials(mesh)
+    ).mechanics.materials(mesh)
     assert one.hash() == other.hash()
     np.testing.assert_allclose(
         one.small_strain(len(mesh.tets))[0],
-        with_effects(anisotropy=1.3).materials(mesh).small_strain(len(mesh.tets))[0],
+        with_effects(anisotropy=1.3).mechanics.materials(mesh).small_strain(len(mesh.tets))[0],
         rtol=1e-12,
     )
 
@@ -164,10 +164,10 @@ def test_beside_obstacles_weight_acts_from_the_first_instant_on(mesh):
     job = with_effects(90.0, gravity=1300.0)
     beside = attrs.evolve(job, obstacles=(RigidBody(far),))
     free, _ = moved(job, mesh)
-    model = beside.model(mesh)
+    model = beside.mechanics.model(mesh)
     assert len(model.obstacles) == 1
     simulated_in_time = simulate_in_time(
-        Equilibrium(model, beside.materials(mesh), beside.mechanics.newton), TIME, PRESSURE
+        Equilibrium(model, beside.mechanics.materials(mesh), beside.mechanics.newton), TIME, PRESSURE
     )
     for k, state in enumerate(simulated_in_time.states):
         np.testing.assert_allclose(state.u, free.states[k].u, atol=1e-6)

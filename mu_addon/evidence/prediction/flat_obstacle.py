@@ -8,16 +8,12 @@ from typing import Any
 import attrs
 import numpy as np
 
-from ...arrays import Array
+from ...arrays import Array, float64
 from ...errors import InputError
 
 CONTACT = "contact"
 # A wall nearer than this share of the free unit's way is not computed.
 NEAREST = 0.9
-
-
-def _float64(values: Any) -> Array:
-    return np.ascontiguousarray(values, np.float64)
 
 
 @attrs.frozen(eq=False)
@@ -31,11 +27,11 @@ class ObstacleResponse:
     where sizes are counted from. Raises InputError.
     """
 
-    pressures_kPa: Array = attrs.field(converter=_float64)
-    outward_mm: Array = attrs.field(converter=_float64)
-    reaches_mm: Array = attrs.field(converter=_float64)
-    shares: Array = attrs.field(converter=_float64)
-    changes: Array = attrs.field(converter=_float64)
+    pressures_kPa: Array = attrs.field(converter=float64)
+    outward_mm: Array = attrs.field(converter=float64)
+    reaches_mm: Array = attrs.field(converter=float64)
+    shares: Array = attrs.field(converter=float64)
+    changes: Array = attrs.field(converter=float64)
     spare_mm: float = 0.0
 
     def __attrs_post_init__(self) -> None:

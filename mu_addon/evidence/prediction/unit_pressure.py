@@ -11,7 +11,7 @@ from typing import Any
 import attrs
 import numpy as np
 
-from ...arrays import Array
+from ...arrays import Array, float64
 from ...errors import InputError
 from ...measured import Experiment
 from ...measured.pose import Direction, X, down
@@ -32,10 +32,6 @@ BEYOND = 1.25
 REMEMBERED = 64
 
 
-def _float64(values: Any) -> Array:
-    return np.ascontiguousarray(values, np.float64)
-
-
 @attrs.frozen(eq=False)
 class Variant:
     """The unit's response with one static effect, at m sizes of it.
@@ -47,8 +43,8 @@ class Variant:
     """
 
     parameter: Parameter
-    at: Array = attrs.field(converter=_float64)
-    values: Array = attrs.field(converter=_float64)
+    at: Array = attrs.field(converter=float64)
+    values: Array = attrs.field(converter=float64)
 
     def __attrs_post_init__(self) -> None:
         if len(self.at) < 2 or not (np.diff(self.at) > 0).all() or self.parameter.null not in self.at:
@@ -73,8 +69,8 @@ class UnitResponse:
     """
 
     channels: tuple[str, ...]
-    pressures_kPa: Array = attrs.field(converter=_float64)
-    values: Array = attrs.field(converter=_float64)
+    pressures_kPa: Array = attrs.field(converter=float64)
+    values: Array = attrs.field(converter=float64)
     variants: Mapping[str, Variant] = attrs.field(factory=dict)
     scale: float = 1.0
     orientation_deg: float = 0.0
