@@ -9,7 +9,7 @@ from __future__ import annotations
 import re
 from collections import Counter
 from collections.abc import Sequence
-from itertools import zip_longest
+from itertools import pairwise, zip_longest
 
 import attrs
 import numpy as np
@@ -375,16 +375,15 @@ def _block(
     if units is not None and not named:
         # Columns that are known by their units alone.
         named, units = [], units
-    heads = named[-1].cells if named else ()
-    labels: Sequence[str] = ()
-    if len(named) > 1:
-        pairs = tuple(zip_longest(named[-2].cells, heads, fillvalue=""))
-        if _is_label_row(named[-2], named[-1]):
-            # A cell above an empty one is the title of its column.
-            labels = tuple(above if head else "" for above, head in pairs)
-            heads = tuple(head or above for above, head in pairs)
-        else:
-            heads = tuple(f"{above} {head}".strip() for above, head in pairs)
+    labelled = next((k for k, two in enumerate(pairwise(named)) if _is_label_row(*two)), None)
+    above = () if labelled is None else named.pop(labelled).cells
+    joined = (
+        " ".join(filter(None, cells)) for cells in zip_longest(*(r.cells for r in named[-2:]), fillvalue="")
+    )
+    pairs = tuple(zip_longest(above, joined, fillvalue=""))
+    # A cell above an empty one is the title of its column.
+    labels = tuple(label if head else "" for label, head in pairs)
+    heads = tuple(head or label for label, head in pairs)
     width = max(len(row.cells) for row in rows)
     _require_divided(sheet, heads, rows)
     lines = np.array([row.line for row in rows])
@@ -417,7 +416,7 @@ def _block(
             for i, text in read[k].bad.items()
             if filled[i]
         }
-        label = next((_cell(labels, k) for k in range(group[0], -1, -1) if _cell(labels, k)), "")
+        label = next((_cell(labels, k) for k in range(group[-1], -1, -1) if _cell(labels, k)), "")
         parts.append(
             Block(
                 sheet=sheet.name,

@@ -311,11 +311,14 @@ def _band(off: Sequence[Array]) -> float:
 
 
 def _independent(off: Array) -> float:
-    """Number of independent readings worth these correlated ones, by their lag-one correlation."""
+    """Number of independent readings worth these correlated ones, by their lag-one correlation.
+
+    At least one and one a wave: a smooth error, as of hysteresis without noise, repeats in every sweep.
+    """
     if len(off) < 3 or not off.any():
         return float(len(off))
     rho = float(np.clip(off[1:] @ off[:-1] / (off @ off), 0.0, 0.999))
-    return len(off) * (1 - rho) / (1 + rho)
+    return max(len(off) * (1 - rho) / (1 + rho), 1 + np.count_nonzero(off[1:] * off[:-1] < 0) / 2)
 
 
 def sweeps_of(time_s: Array, angle_deg: Array, voltage_V: Array, fewest: int = 2) -> list[CalibrationSweep]:

@@ -462,6 +462,9 @@ def test_what_is_refused_says_why(tmp_path, name):
         lambda s: f"2026-03-01T10:00:{s:06.3f}Z",
         lambda s: f"01.03.2026 10:00:{s:06.3f}".replace(".000", ",000"),
         lambda s: f"3/1/2026 10:00:{s:06.3f} PM",
+        lambda s: (
+            f"3/1/2026 {11 if s < 5 else 12}:{59 if s < 5 else 0:02d}:{(55 + s) % 60:06.3f} {'AP'[s >= 5]}M"
+        ),
         lambda s: f"10:00:{s:06.3f}",
         lambda s: f"{23 if s < 5 else 0}:{59 if s < 5 else 0:02d}:{(55 + s) % 60:06.3f}",
         lambda s: f"00:{s:06.3f}",

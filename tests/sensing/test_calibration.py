@@ -100,11 +100,30 @@ def test_the_band_holds_what_it_promises(wrong: dict[str, float]) -> None:
     assert np.median(widths) < 2.2 * (0.01 + 2.5 * wrong.get("whole", 0) + wrong.get("hysteresis", 0))
 
 
+def test_two_sweeps_apart_as_a_whole_have_the_band_of_one_degree_of_freedom() -> None:
+    angle = np.linspace(0, 50, 200)
+    apart = 0.002
+    found = calibrate(
+        [CalibrationSweep(angle, angle, 2 + 0.03 * angle + off) for off in (0.0, apart)], "light_V"
+    )
+    # Student's t of one degree of freedom at 97.5 %.
+    assert found.band_V == pytest.approx(12.7062 * apart, rel=1e-4)
+    assert found.insensitive_deg == [], "the interval of 1.7 degrees is less than a fifth of 50"
+
+
+def test_hysteresis_without_noise_has_no_wider_band_than_with_noise() -> None:
+    """Of one smooth wave a sweep, two sweeps tell its size as three or four readings would."""
+    generator = np.random.default_rng(6)
+    found = calibrate([sweep(generator, 60 * k, noise=0.0, hysteresis=0.02) for k in range(2)], "light_V")
+    assert 2.5 < found.band_V / (0.02 / np.sqrt(2)) < 3.5
+
+
 def test_where_the_sensor_says_nothing_the_interval_is_wide() -> None:
     generator = np.random.default_rng(1)
     found = calibrate([sweep(generator) for _ in range(4)], "light_V")
     _, low, high, _ = found.angle_of(light(np.array([3.0, 40.0])))
     assert high[0] - low[0] > 3 * (high[1] - low[1])
+    assert found.insensitive_deg == pytest.approx([0.0, 16.0], abs=4.0)
     assert low[0] <= 3.0 <= high[0]
 
 

@@ -104,6 +104,15 @@ def test_clock_and_number_wrap() -> None:
     assert decoder.counters.lost == decoder.counters.restarts == 0
 
 
+@pytest.mark.parametrize(
+    ("name", "tick_s"), [("time_us", 1e-6), ("micros", 1e-6), ("t_ms", 1e-3), ("millis", 1e-3)]
+)
+def test_a_clock_in_text_begins_again_after_32_bits(name: str, tick_s: float) -> None:
+    ticks = [(2**32 - 300 + 10 * k) % 2**32 for k in range(60)]
+    groups = fed(Decoder(), "".join(f"light:{k},{name}:{t}\n" for k, t in enumerate(ticks)).encode())
+    np.testing.assert_allclose(np.diff(all_of(groups, "device_s")), 10 * tick_s, rtol=1e-6)
+
+
 def test_turns_missed_while_unplugged_are_counted_by_the_host() -> None:
     decoder = Decoder()
     before = fed(decoder, INFO + frames(50))
@@ -271,6 +280,7 @@ LINES_AS_SENT = {
     "a:1 g=2": {"a": 1.0, "g": 2.0},
     "1.23V,0.020V": {"channel1": 1.23, "channel2": 0.02},
     "1,230;0,020": {"channel1": 1.23, "channel2": 0.02},
+    "light: 850 µV, dark: 20 uV, high: 1.5 kV": {"light": 8.5e-4, "dark": 2e-5, "high": 1500.0},
     "850 mV\t1.5 V": {"channel1": 0.85, "channel2": 1.5},
 }
 
