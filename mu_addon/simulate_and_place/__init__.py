@@ -50,7 +50,6 @@ if TYPE_CHECKING:
         lit,
         marched,
         motion_of_best,
-        ranked,
         require_paths,
         search_of,
         sweep_figures,
@@ -59,7 +58,7 @@ if TYPE_CHECKING:
         words_on_estimates,
         words_on_solved,
     )
-    from .ranking import Ranking, extremes
+    from .ranking import Ranking, extremes, ranked
     from .settings import ESTIMATED, left_out
     from .shown_motion import (
         assumption_parts,

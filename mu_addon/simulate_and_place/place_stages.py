@@ -11,7 +11,7 @@ import numpy as np
 from ..arrays import Array
 from ..body.candidates import PrintedWaveguides
 from ..body.waveguide import bar_of
-from ..design.anchors import anchor_points, windows
+from ..design.anchors import windows
 from ..design.body import Body
 from ..design.parameters import Unit
 from ..errors import ConvergenceError, InputError
@@ -101,25 +101,6 @@ def marched(waveguides: PrintedWaveguides, number: int, samples: Samples) -> Arr
         return waveguides.simulated_in_time(number, samples.time_s, samples.pressure_kPa)
     except ConvergenceError:
         return np.empty((0, *waveguides.anchors.shape))
-
-
-def ranked(
-    motion: Trajectory,
-    compared: Comparison,
-    mechanics: Mechanics,
-    stations: int,
-    standing: Standing | None,
-    check: PathCheck | None,
-    moved: Mapping[str, Array] | None,
-) -> Ranking:
-    """The ranking of candidates by pressure (standing, check), or instant by instant (moved)."""
-    anchors = anchor_points(mechanics.unit)
-    if standing is None:
-        found, not_reached = evaluated_in_time(compared.names, moved or {}, motion, anchors, stations)
-        return Ranking(found, not_reached=tuple(not_reached))
-    own = attrs.evolve(standing, anchors={**standing.anchors}, not_reached=[*standing.not_reached])
-    every = evaluated(compared, own, check or PathCheck(), motion, anchors, stations)
-    return Ranking(every, None, own.at_least_mm, tuple(own.not_reached))
 
 
 def sweep_figures(standing: Standing, check: PathCheck | None) -> dict[str, Any]:

@@ -9,9 +9,13 @@ import attrs
 import numpy as np
 
 from ..arrays import Array
+from ..design.anchors import anchor_points
 from ..errors import ConvergenceError
+from ..fem.trajectory import Trajectory
 from ..placement.candidates import Candidate
 from ..placement.deviation import Deviation, rank
+from .compared_pressures import Comparison, PathCheck, Standing, evaluated, evaluated_in_time
+from .mechanics import Mechanics
 
 COLUMNS = [
     "path",
@@ -87,6 +91,25 @@ class Ranking:
                 bound = f"{self.at_least_mm[c.name]:.9g}"
                 rows.append((c.name, c.start, c.length, "", "", "", "", "no" if mesh else "", bound))
         return rows
+
+
+def ranked(
+    motion: Trajectory,
+    compared: Comparison,
+    mechanics: Mechanics,
+    stations: int,
+    standing: Standing | None,
+    check: PathCheck | None,
+    moved: Mapping[str, Array] | None,
+) -> Ranking:
+    """The ranking of candidates by pressure (standing, check), or instant by instant (moved)."""
+    anchors = anchor_points(mechanics.unit)
+    if standing is None:
+        found, not_reached = evaluated_in_time(compared.names, moved or {}, motion, anchors, stations)
+        return Ranking(found, not_reached=tuple(not_reached))
+    own = attrs.evolve(standing, anchors={**standing.anchors}, not_reached=[*standing.not_reached])
+    every = evaluated(compared, own, check or PathCheck(), motion, anchors, stations)
+    return Ranking(every, None, own.at_least_mm, tuple(own.not_reached))
 
 
 def mesh_change_mm(

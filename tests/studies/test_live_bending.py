@@ -101,15 +101,21 @@ def test_chambers_that_a_kept_shape_lacks_or_has_too_many_bend_as_its_own(tmp_pa
         write_model_a(tmp_path / "motion", mesh, materials_of(unit, mesh), motion)
         return read_motion(tmp_path / "motion")
 
-    known.keep(shaped(unit), {"states": [[0.0, 0.0], [40.0, 60.0]]}, unit, tmp_path / "shapes")
-    wanted, found = unit.evolve(count=count), known.nearest(unit.evolve(count=count), tmp_path / "shapes")
+    had, wanted = shaped(unit), unit.evolve(count=count)
+    known.keep(had, {"states": [[0.0, 0.0], [40.0, 60.0]]}, unit, tmp_path / "shapes")
+    # Twice as stiff, it needs twice the pressure and has twice the stress.
+    found = known.nearest(wanted.evolve(membrane_modulus_kPa=5000.0), tmp_path / "shapes")
     assert found.same == (count == 5)
-    assert found.answer["states"][1] == [40.0, pytest.approx(60.0 * count / 5)]
+    assert found.answer["states"][1] == [80.0, pytest.approx(60.0 * count / 5)]
+    assert (found.motion.pressure_kPa.tolist(), found.motion.state_kPa.tolist()) == ([0.0, 80.0],) * 2
     truth = shaped(wanted)
     for region, surface in truth.surfaces.items():
         own, nodes = found.motion.surfaces[region], found.motion.mesh.nodes
         assert len(own.triangles) == len(surface.triangles) == len(own.cut)
-        assert found.motion.fields[region]["von_mises_kPa"].shape == (2, len(own.node))
+        for name, values in found.motion.fields[region].items():
+            assert values.shape == (2, len(own.node))
+            most = (2.0 if name.endswith("_kPa") else 1.0) * had.fields[region][name].max()
+            assert values.max() == pytest.approx(most, rel=0.1), name
         places = nodes[own.node]
         distance, _ = KDTree(places).query(truth.mesh.nodes[surface.node])
         assert distance.max() < 0.01, "the same surface at rest"
