@@ -52,6 +52,14 @@ def test_three_ogden_terms_follow_treloars_rubber_in_all_modes(to_all_modes, tre
     assert mu == pytest.approx(Ogden.small_strain(OGDEN_1972[None])[0, 0], rel=0.12)
 
 
+def test_aicc_counts_the_variance_of_the_noise_as_a_parameter(treloar):
+    for name, k in (("neo-hooke", 2), ("yeoh", 4)):
+        found = fit_coupons(FORMS[name], [treloar["uniaxial"]])
+        n = found.n
+        penalty = found.aicc(n) - n * np.log(found.rss / n)
+        assert penalty == pytest.approx(2 * k + 2 * k * (k + 1) / (n - k - 1))
+
+
 def test_ogdens_published_parameters_lie_in_the_intervals_of_a_fit_by_relative_errors(treloar):
     found = fit_coupons(FORMS["ogden-3"], list(treloar.values()), weights="relative", profile=True)
     values = {p.name: p for p in found.intervals}

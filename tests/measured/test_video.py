@@ -113,6 +113,13 @@ def test_a_marker_that_slips_is_told():
     assert float(remark.what.rpartition(" at ")[2].removesuffix(" s")) >= 2.8
 
 
+def test_a_base_that_turns_about_its_middle_is_told():
+    """By 1.5 degrees either way of its mean: its markers, 120 pixels apart, move by 60 times that angle."""
+    pixels = np.concatenate([picture(arc(BEND))[:, :21], picture(arc(BEND), turn_deg=183.0)[:, 21:]], axis=1)
+    (remark,) = motion(tracks(pixels), VIEW, REST, TIME).remarks
+    assert f"move by up to {60 * np.radians(3.0) * 21 / 41:.3g} pixels" in remark.what
+
+
 def test_a_camera_that_moves_is_told_and_taken_out_where_asked():
     pixels = picture(arc(BEND))
     swing = np.radians(2.0) * np.sin(7 * TIME)
@@ -166,3 +173,8 @@ def test_rest_is_where_there_is_no_pressure_and_all_is_seen():
     assert np.flatnonzero(resting(p, seen, 0.02, 5)).tolist() == [1, 2]
     assert np.flatnonzero(resting(p, np.ones((1, 6)), 0.02, 2)).tolist() == [0, 1]
     assert not resting(p + 5.0, seen, 0.02, 5).any()
+    # Of suction, too, the share is of the whole range.
+    assert np.flatnonzero(resting(np.array([0.3, -0.3, -20.0, -5.0]), np.ones((1, 4)), 0.02, 5)).tolist() == [
+        0,
+        1,
+    ]

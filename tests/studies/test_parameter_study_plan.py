@@ -212,6 +212,17 @@ def test_effects_of_a_known_function():
     assert of_kind.share == pytest.approx(0.75, abs=0.03)
 
 
+def test_the_share_of_few_points_is_corrected_for_the_number_of_groups():
+    """Epsilon squared in closed form: 1 - (4/2)/(20/3); twelve values are four groups of three."""
+    assert main_effect(["a", "a", "b", "b"], np.array([1.0, 3.0, 5.0, 7.0])).share == pytest.approx(0.7)
+    assert main_effect([float(v) for v in range(12)], np.arange(12.0)).places.tolist() == [
+        1.0,
+        4.0,
+        7.0,
+        10.0,
+    ]
+
+
 def test_an_input_that_never_changes_says_nothing():
     assert np.isnan(main_effect([1.0] * 5, np.arange(5.0)).share)
 
