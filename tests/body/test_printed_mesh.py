@@ -17,7 +17,7 @@ from mu_addon.fem.bending_angle import bending_angle_deg
 from mu_addon.fem.dead_loads import gravity
 from mu_addon.fem.equilibrium import Equilibrium
 from mu_addon.fem.model import Model
-from mu_addon.fem.self_contact import SelfContact
+from mu_addon.fem.self_contact import self_contact_of
 from mu_addon.fem.unit_materials import materials_of
 from mu_addon.meshing.mesh import LATTICE, MEMBRANE, boundary_faces, mirror, mirror_displacement
 from mu_addon.meshing.settings import MeshSettings
@@ -94,7 +94,9 @@ def test_ties_keep_straight_what_is_straight(mesh):
 
 def test_all_of_a_strut_touches_but_its_feet(mesh):
     pytest.importorskip("ipctk")
-    contact = SelfContact(mesh, 0.1, 0.1)
+    contact = self_contact_of(SMALL, mesh)
+    # As docs/engineering/method.md has them for a wall of 0.9 mm and a resin of 2.5 MPa.
+    assert (contact.gap_mm, contact.stiffness_MPa) == pytest.approx((0.1, 0.1))
     still = np.zeros_like(mesh.nodes)
     assert contact.energy_mJ(still) == 0.0
     assert not contact.intersects(still)

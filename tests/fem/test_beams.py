@@ -142,6 +142,17 @@ def test_a_tapered_cantilever_is_exact_with_one_element():
     assert x[-1, 0] == pytest.approx(expected, rel=1e-6)
 
 
+@pytest.mark.parametrize("stretch", [0.3, 0.7, 1.8])
+def test_a_pulled_or_pressed_rod_is_an_incompressible_neo_hookean_one(stretch):
+    """F = E A (l - 1/l^2)/3, down to a third of its length, too."""
+    area, young = 0.7, 2.0
+    beams = along(np.array([[0.0, 0.0, 0.0], [0.0, 0.0, 5.0]]), area, 0.3, 0.6, young)
+    x = np.zeros((1, 12))
+    x[0, 8] = 5.0 * (stretch - 1.0)
+    axial, _ = beams.end_loads(x)
+    assert axial == pytest.approx([young * area * (stretch - stretch**-2) / 3])
+
+
 @pytest.mark.parametrize("way", [[0, 0, 10.0], [3.0, -4.0, 5.0]])
 def test_end_loads_of_a_tapered_cantilever_are_those_of_statics(way):
     way = np.array(way)

@@ -5,6 +5,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from mu_addon.graph import Evaluation, Kept, NodeTree, State
+from mu_addon.graph.evaluation import MOST_KEPT
 
 from .toys import DEFINITIONS, node, tree
 
@@ -154,3 +155,12 @@ def test_a_refresh_starts_no_run_and_knows_what_records_know():
     other = Evaluation(with_setting(found, "a", more=2.5), definitions, records=records)
     other.run()
     assert [other.states[n].state for n in "rt"] == ["waiting", "waiting"]
+
+
+def test_what_was_used_last_stays_when_the_oldest_are_dropped():
+    kept = Kept()
+    for n in range(MOST_KEPT):
+        kept.put(str(n), n)
+    assert kept.get("0") == 0
+    kept.put("one more", 1)
+    assert (kept.get("0"), kept.get("1"), kept.get("2")) == (0, None, 2)

@@ -5,9 +5,11 @@ import attrs
 import numpy as np
 import pytest
 
-from mu_addon.optimization.freedoms import Freedom
+from mu_addon.design.parameters import Unit
+from mu_addon.optimization.freedoms import Freedom, changed_unit
 from mu_addon.optimization.search import Observed, SearchSettings, pareto
 from mu_addon.optimization.targets import Target
+from mu_addon.optimization.uncertainty import Uncertainty
 
 from .bodies import search_units
 
@@ -162,3 +164,9 @@ def test_a_margin_keeps_a_design_that_far_inside_its_bounds():
     found = search_units(TWO, asked, with_margin(0.35), (0.1, 0.5), SearchSettings(30))
     assert not found.feasible
     assert best(found).design[0] == pytest.approx(1.5, abs=0.05)
+
+
+def test_a_print_scatters_every_surface_alike():
+    by_print, _ = Uncertainty(0.05, 0.1).freedoms(Unit())
+    moved = changed_unit(Unit(), [by_print], [0.1]).print
+    assert (moved.offset_xy_mm, moved.offset_z_mm) == (0.1, 0.1)

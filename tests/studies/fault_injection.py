@@ -23,6 +23,7 @@ import numpy as np
 import pytest
 
 from mu_addon import design
+from mu_addon.body import mesh_printed
 from mu_addon.design.parameters import load_preset
 from mu_addon.fem.protocol import Protocol as PressureProtocol
 from mu_addon.meshing.settings import MeshSettings
@@ -34,7 +35,7 @@ from mu_addon.sensing.framing import info_frame, sample_frame
 from mu_addon.sensing.optics import Optics
 from mu_addon.sensing.recording import read_recording
 from mu_addon.sensing.sources import EndOfStream
-from mu_addon.simulate_and_place import light, motion
+from mu_addon.simulate_and_place import light
 from mu_addon.studies.parameter_study.point import Outcome, Task
 from mu_addon.studies.starting import start
 from mu_addon.studies.unit_ranking import UnitStudy
@@ -267,7 +268,7 @@ def started(job: UnitStudy) -> Run:
 def simulation(monkeypatch: pytest.MonkeyPatch) -> Run:
     """A `simulate` that computes its solid and mesh once in a session."""
     monkeypatch.setattr(design, "build_solid", functools.cache(design.build_solid))
-    monkeypatch.setattr(motion, "mesh_printed", computed_once(motion.mesh_printed))
+    monkeypatch.setattr("mu_addon.body.mesh_printed", computed_once(mesh_printed))
     return started(STUDY)
 
 

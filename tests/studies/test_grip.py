@@ -18,6 +18,7 @@ from mu_addon.fem.protocol import Protocol
 from mu_addon.fem.unit_materials import materials_of
 from mu_addon.files import read_npz
 from mu_addon.grasp import NAMES, Contact, Cube, Phases, grasp, read_phases, shipped_phases
+from mu_addon.grasp.hand import Lift
 from mu_addon.report.grasp_files import even, write_halves
 from mu_addon.report.motion_files import read_motion
 from mu_addon.report.pc2 import read_pc2
@@ -136,6 +137,11 @@ def test_the_smaller_cube_bends_a_finger_more_and_is_pressed_less(smooth):
     assert 0 < small.normal_N[hold] < large.normal_N[hold]
     # Before either is touched they are one.
     assert small.angle_deg[small.end("i")] == pytest.approx(large.angle_deg[large.end("i")], abs=1e-6)
+
+
+def test_a_cubes_margin_is_of_the_largest_pull_and_by_coulombs_rule():
+    lift = Lift(True, 0.1, 0.5, 2.0, 0.4, np.arange(3.0), np.array([0.2, 1.5, 1.2]))
+    assert (lift.capacity_N, lift.margin, lift.margin_by_rule) == (1.5, 3.0, pytest.approx(3.2))
 
 
 def test_the_printable_part_from_the_command_line(tmp_path, capsys):

@@ -30,7 +30,6 @@ from mu_addon.materials.library import load_material, material_text, parse_mater
 from mu_addon.measured import read_folder
 from mu_addon.meshing.settings import MeshSettings
 from mu_addon.report.motion_files import read_motion
-from mu_addon.simulate_and_place import motion
 from mu_addon.simulate_and_place.motion_tables import MOTION_COLUMNS
 from mu_addon.studies.unit_ranking import UnitStudy
 
@@ -58,7 +57,7 @@ def solid_struts(monkeypatch):
     def solid(*given, **more):
         return mesh_printed(*given, **{**more, "solid": True})
 
-    monkeypatch.setattr(motion, "mesh_printed", solid)
+    monkeypatch.setattr("mu_addon.body.mesh_printed", solid)
 
 
 def simulated(folder, job):
