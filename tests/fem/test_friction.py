@@ -95,6 +95,17 @@ def test_a_stored_memory_gives_the_forces_back():
     )
 
 
+def test_a_stored_memory_knows_what_slid_though_the_lid_has_left():
+    mesh = box((3, 3, 3), clamp=True)
+    path = along([0, 1, 2, 3], [(0, 0, 0), (0, 0, -0.05), (0.3, 0, -0.05), (0.3, 0, 0.05)])
+    drawn, again = (Obstacle(mesh, LID, 0.05, 0.002, friction=MU, path=path) for _ in range(2))
+    states, contacts = simulated_in_time(touching(mesh, drawn), np.linspace(0, 3, 7))
+    assert contacts[-1].area_mm2 == 0.0
+    assert contacts[-1].slid_mm.max() > 0.1
+    again.restore(states[-1].u, drawn.kept())
+    np.testing.assert_array_equal(again.contact(states[-1].u).slid_mm, contacts[-1].slid_mm)
+
+
 def test_a_turned_lid_is_held_by_the_moment_of_its_pressure():
     """About its middle: mu N times the mean distance of a square's points from its centre, 0.3826 sides."""
     mesh = box((4, 4, 2), (1, 1, 0.5), clamp=True)

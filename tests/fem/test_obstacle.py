@@ -52,6 +52,21 @@ def test_an_obstacle_out_of_reach_changes_nothing():
     assert len(obstacle.forces(u)[0]) == len(obstacle.blocks(u)[0]) == 0
 
 
+def test_the_energy_of_a_face_is_the_work_that_pressed_it_in():
+    """Through the depth at which the pressure's rise becomes straight."""
+    mesh, depth = box((2, 2, 2), clamp=True), 0.01
+    still = np.zeros_like(mesh.nodes)
+    path = depth * np.linspace(0.0, 3.0, 301)
+    energy, force = [], []
+    for s in path:
+        obstacle = Obstacle(mesh, Plane((0, 0, 1.0 - s), (0, 0, -1)), 0.3, depth)
+        energy.append(obstacle.energy_mJ(still))
+        force.append(obstacle.contact(still).normal_N[2])
+    np.testing.assert_allclose(
+        np.diff(energy), np.diff(path) * (np.add(force[1:], force[:-1]) / 2), rtol=1e-2, atol=1e-9
+    )
+
+
 @pytest.mark.parametrize("order", [1, 2])
 def test_patch(order):
     """A block pressed by a plane is strained alike everywhere, as by a pressure, to rounding."""

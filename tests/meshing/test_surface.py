@@ -15,7 +15,7 @@ from hypothesis.extra.numpy import arrays
 
 from mu_addon.design.surface import winding_number
 from mu_addon.errors import InputError, MeshingError
-from mu_addon.meshing import LATTICE, mesh_surface
+from mu_addon.meshing import LATTICE, mesh_surface, surface
 from mu_addon.meshing.mesh import Mesh, boundary_faces, oriented
 from mu_addon.meshing.quality import element_volumes
 from mu_addon.meshing.surface import _fullness
@@ -43,6 +43,18 @@ def test_a_box_of_order_two_has_flat_sides() -> None:
     assert mesh.order == 2
     assert element_volumes(mesh).min() > 0
     assert element_volumes(mesh).sum() == pytest.approx(480.0, rel=1e-9)
+
+
+def test_a_mesh_with_a_flat_element_is_made_anew_and_the_good_one_kept(tmp_path, monkeypatch) -> None:
+    corners = np.array([[x, y, z] for x in (0.0, 1) for y in (0, 1) for z in (0, 1)])
+    five = [[0, 6, 5, 3], [4, 0, 6, 5], [2, 0, 6, 3], [1, 0, 5, 3], [7, 6, 5, 3]]
+    flat = np.array([[0.2, 0.2, 0.5], [0.8, 0.2, 0.5], [0.2, 0.8, 0.5], [0.5, 0.5, 0.5 + 1e-6]])
+    made = [(np.vstack([corners, flat]), np.array([*five, [8, 9, 10, 11]])), (corners, np.array(five))]
+    monkeypatch.setattr(surface, "_tetrahedralize", lambda *_: made.pop(0))
+    box = trimesh.creation.box((1.0, 1.0, 1.0))
+    for _ in range(2):
+        mesh = mesh_surface(box.vertices + 0.5, box.faces, 1.0, cache=tmp_path)
+        assert len(mesh.tets) == 5
 
 
 def test_the_cache_makes_it_repeatable(tmp_path: Path) -> None:
