@@ -43,8 +43,8 @@ class Shape:
     def places(self, state: ChainState) -> Array:
         """Positions (m, 3) in mm of the nodes of `mesh` in a state of the chain.
 
-        A unit's free state at its pressure, advanced by the constant strain between its plates: exact on the
-        plates, approximate between them.
+        A unit's free states about its pressure, advanced by the constant strain between its plates: exact on
+        the plates, approximate between them.
         """
         found = []
         parts = zip(self.turns_deg, self.meshes, self.learned, state.plates, strict=False)
@@ -54,12 +54,14 @@ class Shape:
             number = np.interp(p, joint.pressure_kPa, np.arange(len(joint.pressure_kPa)))
             k = min(int(number), max(len(joint.pressure_kPa) - 2, 0))
             share = number - k
-            u, eta0 = (
-                (1 - share) * table[k] + share * table[min(k + 1, len(table) - 1)]
-                for table in (learned.free_u, joint.eta0)
-            )
             station = np.clip(mesh.nodes[:, 2] / float(mesh.nodes[mesh.tip[0], 2]), 0.0, 1.0)
-            x = mesh.nodes + spread(mesh, u, station, eta0, state.eta[i])
+            # Each brought to the plates of the state: of two apart, a mean would shrink what turns.
+            u = sum(
+                weight * spread(mesh, learned.free_u[n], station, joint.eta0[n], state.eta[i])
+                for n, weight in ((k, 1 - share), (k + 1, share))
+                if weight
+            )
+            x = mesh.nodes + u
             own = base @ frame(turn)
             found.append(x @ own[:3, :3].T + own[:3, 3])
         return np.concatenate(found)

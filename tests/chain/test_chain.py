@@ -1,15 +1,19 @@
 """Chains of beams: closed forms, the elastica, frame indifference, derivatives, reach."""
 
+import attrs
 import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
 from scipy.optimize import brentq
 
-from mu_addon.chain import Chain, Link, Loads, reach_point
+from mu_addon.chain import Chain, Link, Loads, Shape, reach_point
 from mu_addon.chain.chain import GRAVITY_N_PER_G
+from mu_addon.chain.joint_learning import Learned
 from mu_addon.chain.rigid_motion import exponential
+from mu_addon.chain.unit_between_plates import frame
 from mu_addon.errors import ConvergenceError, InputError
 
+from ..fem.bodies import box
 from .beams import beam
 
 DOWN = np.array([0.0, 0.0, 1.0])
@@ -35,6 +39,35 @@ def test_small_loads_bend_a_chain_as_a_cantilever():
         chain = Chain([Link(beam(length / n, bending))] * n, Loads(tip_force_N=np.array([0.0, force, 0.0])))
         wanted = force * length**3 / (3 * bending) * (1 - 1 / (4 * n**2))
         assert chain.at_rest().tip_mm[1] == pytest.approx(wanted, rel=1e-4)
+
+
+def test_a_drawn_unit_ends_on_its_plate_at_pressures_between_those_learned():
+    length, turns = 40.0, (0.0, 90.0)
+    joint = beam(length, 1e3, curvature=0.03)
+    mesh = box((1, 1, 4), (6.0, 6.0, length), clamp=True)
+    mesh = attrs.evolve(mesh, tip=np.flatnonzero(mesh.nodes[:, 2] == length))
+    free = [
+        np.array([(exponential(z / length * eta0) @ [x, y, 0.0, 1.0])[:3] for x, y, z in mesh.nodes])
+        - mesh.nodes
+        for eta0 in joint.eta0
+    ]
+    shape = Shape(turns, (mesh, mesh), (Learned(joint, (), np.array(free)),) * 2)
+    chain = Chain([Link(joint, turn) for turn in turns])
+    still = chain.at_rest()
+    np.testing.assert_allclose(shape.places(still), shape.mesh().nodes, atol=1e-9)
+    for pressures in ([5.0, 3.0], [10.0, 7.5]):
+        state = chain.reach(still, np.array(pressures))
+        units = np.split(shape.places(state), 2)
+        for turn, places, plate in zip(turns, units, state.plates[1:], strict=True):
+            own = plate @ frame(turn)
+            wanted = (mesh.nodes[mesh.tip] - [0.0, 0.0, length]) @ own[:3, :3].T + own[:3, 3]
+            np.testing.assert_allclose(places[mesh.tip], wanted, atol=1e-6)
+    # What swells at 10 kPa has swollen by half of that at 5 kPa.
+    swollen = free[1] + 0.1 * mesh.nodes * (mesh.nodes[:, 2:] == length / 2) * [1.0, 0.0, 0.0]
+    other = Shape((0.0,), (mesh,), (Learned(joint, (), np.array([free[0], swollen])),))
+    state = Chain([Link(joint)]).reach(Chain([Link(joint)]).at_rest(), np.array([5.0]))
+    grown = other.places(state) - attrs.evolve(other, learned=shape.learned[:1]).places(state)
+    np.testing.assert_allclose(np.linalg.norm(grown, axis=1), 0.5 * np.linalg.norm(swollen - free[1], axis=1))
 
 
 def test_chains_of_more_and_more_links_come_to_the_elastica():
