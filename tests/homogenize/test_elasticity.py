@@ -26,6 +26,13 @@ def random_materials(count):
     return Materials.neo_hooke(10 ** random.uniform(-1, 1, count), random.uniform(0.1, 0.45, count))
 
 
+def test_the_shear_modulus_of_a_cubic_cell_is_hills_mean():
+    """Of C11 = 3, C12 = 1, C44 = 2: Voigt's (2 + 3 * 2)/5 and Reuss's 5/(2/1 + 3/2)."""
+    C = np.diag([2.0, 2.0, 2.0, 2.0, 2.0, 2.0])
+    C[:3, :3] += 1.0
+    assert Elasticity(C).shear == pytest.approx((8 / 5 + 10 / 7) / 2)
+
+
 @pytest.mark.parametrize("order", [1, 2])
 def test_a_homogeneous_cell_returns_its_own_law(order):
     size = (1.3, 0.7, 2.1)
