@@ -7,10 +7,10 @@ from ..lazy import public_face
 if TYPE_CHECKING:
     from .compared_pressures import (
         Array,
-        Comparison,
         Followed,
         Member,
         PathCheck,
+        RankingSetup,
         Solved,
         Standing,
         followed,

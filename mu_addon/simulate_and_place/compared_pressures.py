@@ -132,7 +132,7 @@ def followed(waveguides: PrintedWaveguides, number: int, pressures_kPa: Sequence
 
 
 @attrs.frozen
-class Comparison:
+class RankingSetup:
     """What candidates are compared at: distinct pressures in kPa, number of instants of each, weight or not.
 
     names: of the candidates.
@@ -210,7 +210,7 @@ class _MissedError(Exception):
 
 
 def solving(
-    compared: Comparison, contest: Contest | None, before: Standing | None = None, begin: bool = False
+    compared: RankingSetup, contest: Contest | None, before: Standing | None = None, begin: bool = False
 ) -> Solving:
     """Yield the candidates and pressures to solve, get their solutions, and return where they stand.
 
@@ -251,7 +251,7 @@ def _solve(
 
 
 def _contested(
-    compared: Comparison, contest: Contest, known: Standing, begin: bool
+    compared: RankingSetup, contest: Contest, known: Standing, begin: bool
 ) -> Generator[list[Member], Sequence[Solved], None]:
     """All candidates at the first pressures, the most promising at all others, then those still open.
 
@@ -291,7 +291,7 @@ def _contested(
     known.at_least_mm = {str(names[n]): float(at_least[n]) for n in np.flatnonzero(~complete)}
 
 
-def _rounds(compared: Comparison, known: Standing) -> Generator[list[Member], Sequence[Solved], None]:
+def _rounds(compared: RankingSetup, known: Standing) -> Generator[list[Member], Sequence[Solved], None]:
     """All candidates at two pressures after two others, until the rest can be interpolated."""
     distinct = [p for p in compared.samples.distinct_kPa if p in known.compared_kPa]
     instants = compared.samples.instants[np.isin(compared.samples.distinct_kPa, distinct)]
@@ -334,7 +334,7 @@ class PathCheck:
 
 
 def following(
-    compared: Comparison, known: Standing
+    compared: RankingSetup, known: Standing
 ) -> Generator[list[Member], Sequence[Followed], PathCheck]:
     """Yield the candidates to follow from rest, get them, and return how far they lie apart.
 
@@ -367,7 +367,7 @@ def following(
 
 
 def evaluated(
-    compared: Comparison,
+    compared: RankingSetup,
     known: Standing,
     check: PathCheck,
     motion: Trajectory,
@@ -431,7 +431,7 @@ def evaluated_in_time(
 def deviation_alone(
     waveguides: PrintedWaveguides,
     number: int,
-    compared: Comparison,
+    compared: RankingSetup,
     motion: Trajectory,
     stations: int,
 ) -> tuple[float, Solved | None]:
@@ -457,7 +457,7 @@ def deviation_alone(
     return found[compared.names[0]].J_hat, Solved(at, *every)
 
 
-def _along(compared: Comparison, known: Standing, check: PathCheck) -> None:
+def _along(compared: RankingSetup, known: Standing, check: PathCheck) -> None:
     """Take every candidate's states along its path from rest, at the pressures that all of them reach."""
     known.at_least_mm = {}
     for pressure in sorted((p for p in known.compared_kPa if p), key=abs):

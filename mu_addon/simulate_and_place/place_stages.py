@@ -27,8 +27,8 @@ from ..placement.search import Search, searching
 from ..report.results import LatticePath, Signals
 from ..run.cache import Cache
 from .compared_pressures import (
-    Comparison,
     PathCheck,
+    RankingSetup,
     Solved,
     Solving,
     Standing,
@@ -170,14 +170,14 @@ def uncertainty(
         reached = {p for p in known.tolist() if all(p in standing.anchors.get(name, {}) for name in names)}
         standing.compared_kPa = sorted(reached)
         motion = motion_of(mesh, few, states or {})
-        found = evaluated(Comparison(names, few), standing, PathCheck(), motion, anchors, stations)
+        found = evaluated(RankingSetup(names, few), standing, PathCheck(), motion, anchors, stations)
         return Uncertainty(mesh_change_mm(ranking.deviations, found, at))
     except ConvergenceError as error:
         return Uncertainty(None, f"The mesh uncertainty is not known: on the coarser mesh, {error.what}.")
 
 
 def letting_in(
-    compared: Comparison, contest: Contest, standing: Standing, check: PathCheck, found: Uncertainty
+    compared: RankingSetup, contest: Contest, standing: Standing, check: PathCheck, found: Uncertainty
 ) -> Solving:
     """Solve on all paths that the mesh uncertainty does not tell from the best, see `solving`.
 
@@ -239,7 +239,7 @@ def check_path(
     motion: Trajectory,
     mechanics: Mechanics,
     limits: Limits,
-    compared: Comparison,
+    compared: RankingSetup,
     stations: int,
 ) -> CheckedPath:
     """A path of the lattice, by its number, on the whole body."""

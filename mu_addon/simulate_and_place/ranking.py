@@ -14,7 +14,7 @@ from ..errors import ConvergenceError
 from ..fem.trajectory import Trajectory
 from ..placement.candidates import Candidate
 from ..placement.deviation import Deviation, rank
-from .compared_pressures import Comparison, PathCheck, Standing, evaluated, evaluated_in_time
+from .compared_pressures import PathCheck, RankingSetup, Standing, evaluated, evaluated_in_time
 from .mechanics import Mechanics
 
 COLUMNS = [
@@ -95,7 +95,7 @@ class Ranking:
 
 def ranked(
     motion: Trajectory,
-    compared: Comparison,
+    compared: RankingSetup,
     mechanics: Mechanics,
     stations: int,
     standing: Standing | None,

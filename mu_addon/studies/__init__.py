@@ -9,7 +9,7 @@ from pkgutil import iter_modules
 
 from ..run.study import Study
 
-_ELSEWHERE = dict.fromkeys(("design", "simulate", "place"), ".unit_ranking") | {"graph": "..nodes.graph"}
+_ELSEWHERE = dict.fromkeys(("design", "simulate", "place"), ".unit_ranking") | {"graph": "..nodes.tree_study"}
 """Module of a study that is in no file of its name here."""
 _SHARED = (
     "inputs",

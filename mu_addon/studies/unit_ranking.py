@@ -269,9 +269,9 @@ class UnitStudy(UnitMotion):
         return tuple(placement.candidate_paths(design.anchor_points(self.unit), self.windows))
 
     @property
-    def compared(self) -> core.Comparison:
+    def compared(self) -> core.RankingSetup:
         """What candidates are compared at."""
-        return core.Comparison(self.path_names, self.samples, self.effects.has_gravity)
+        return core.RankingSetup(self.path_names, self.samples, self.effects.has_gravity)
 
     @property
     def limits(self) -> placement.Limits:
@@ -339,7 +339,7 @@ class UnitStudy(UnitMotion):
     """All candidates at the first pressures, the most promising ones at all."""
 
     @intermediate()
-    def begun(self, compared: core.Comparison, contest: Any, candidates: Members) -> core.Standing:
+    def begun(self, compared: core.RankingSetup, contest: Any, candidates: Members) -> core.Standing:
         """Where the candidates stand once the most promising ones are solved."""
         found: core.Standing = grown(core.solving(compared, contest, begin=True), candidates)
         return found
@@ -354,7 +354,7 @@ class UnitStudy(UnitMotion):
 
     @intermediate()
     def standing(
-        self, compared: core.Comparison, contest: Any, begun: core.Standing, contenders: Members
+        self, compared: core.RankingSetup, contest: Any, begun: core.Standing, contenders: Members
     ) -> core.Standing:
         """Where the candidates stand once the contest is over."""
         found: core.Standing = grown(core.solving(compared, contest, begun), contenders)
@@ -379,7 +379,7 @@ class UnitStudy(UnitMotion):
 
     @intermediate()
     def path_check(
-        self, compared: core.Comparison, begun: core.Standing, followed: Members
+        self, compared: core.RankingSetup, begun: core.Standing, followed: Members
     ) -> core.PathCheck:
         """Whether candidates from Model A's states end where their own paths do."""
         found: core.PathCheck = grown(core.following(compared, begun), followed)
@@ -401,7 +401,7 @@ class UnitStudy(UnitMotion):
     def likely_ranking(
         self,
         motion: fem.Trajectory,
-        compared: core.Comparison,
+        compared: core.RankingSetup,
         mechanics: core.Mechanics,
         stations: int,
         begun: core.Standing,
@@ -413,7 +413,7 @@ class UnitStudy(UnitMotion):
     def first_ranking(
         self,
         motion: fem.Trajectory,
-        compared: core.Comparison,
+        compared: core.RankingSetup,
         mechanics: core.Mechanics,
         stations: int,
         standing: core.Standing | None = None,
@@ -567,7 +567,7 @@ class UnitStudy(UnitMotion):
     @intermediate()
     def last_standing(
         self,
-        compared: core.Comparison,
+        compared: core.RankingSetup,
         contest: Any,
         standing: core.Standing,
         path_check: core.PathCheck,
@@ -586,7 +586,7 @@ class UnitStudy(UnitMotion):
     def ranking(
         self,
         motion: fem.Trajectory,
-        compared: core.Comparison,
+        compared: core.RankingSetup,
         mechanics: core.Mechanics,
         stations: int,
         first_ranking: core.Ranking,
@@ -691,7 +691,7 @@ class UnitStudy(UnitMotion):
         whole_motion: fem.Trajectory,
         mechanics: core.Mechanics,
         limits: placement.Limits,
-        compared: core.Comparison,
+        compared: core.RankingSetup,
         stations: int,
         sensor: Any,
     ) -> core.CheckedPath:

@@ -11,7 +11,7 @@ from mu_addon.placement.deviation import deviation_of
 from mu_addon.placement.deviation_bounds import Contest
 from mu_addon.simulate_and_place import compared_pressures
 from mu_addon.simulate_and_place.compared_pressures import (
-    Comparison,
+    RankingSetup,
     evaluated,
     evaluated_in_time,
     followed,
@@ -47,7 +47,7 @@ def ranked(contest=None, count=3, pressures=PRESSURES, before=None, begin=False)
     """So many candidates through a protocol: standing, path check, deviations, and what was asked."""
     names = [f"path{n}" for n in range(count)]
     samples = Samples(np.arange(float(len(pressures))), pressures, pressures)
-    compared = Comparison(tuple(names), samples)
+    compared = RankingSetup(tuple(names), samples)
     motion = made_up.motion(made_up.mesh(), samples.time_s, pressures)
     states = {round(s.pressure_kPa, 9): s for s in motion.solved}
     sensors = Waveguides(UNIT, motion.mesh, (), ANCHORS)

@@ -15,8 +15,8 @@ from mu_addon.graph import Evaluation, Kept, Node, NodeTree, Source, faults, rea
 from mu_addon.nodes import design_nodes
 from mu_addon.nodes.comparison import compare
 from mu_addon.nodes.definitions import definitions
-from mu_addon.nodes.graph import Graph
 from mu_addon.nodes.templates import steps_of, template, template_names
+from mu_addon.nodes.tree_study import Graph
 
 from .unit_runs import ended
 

@@ -17,8 +17,8 @@ from mu_addon.fem.protocol import Protocol
 from mu_addon.materials.library import load_material
 from mu_addon.measured import read_folder
 from mu_addon.measured.kinds import NOISE
-from mu_addon.nodes.graph import Graph
 from mu_addon.nodes.templates import template
+from mu_addon.nodes.tree_study import Graph
 from mu_addon.optimization import read_design
 from mu_addon.run.context import RunContext
 from mu_addon.run.folder import keep_inputs, same_inputs

@@ -22,9 +22,9 @@ from ...graph.records import NAME as RECORDS
 from ...graph.tree import Source
 from ...graph.tree_file import file_name
 from ...nodes.definitions import definitions
-from ...nodes.graph import Graph
 from ...nodes.plan import plan_of
 from ...nodes.templates import steps_of
+from ...nodes.tree_study import Graph
 from ...studies.starting import write_study
 from ..jobs.start_child import INTERVAL_S, JOB_ENDED, JobKind
 from ..shared import landing, viewports

@@ -11,7 +11,7 @@ from ...errors import InputError
 from ..body.operators import report_flaws, selected_meshes
 from ..preview import materials, skeletons
 from ..shared import viewports
-from ..shared.blender_property import Number, Numbers, Text, blender_property, exact
+from ..shared.blender_property import FloatVector, Number, Text, blender_property, exact
 from ..shared.operators import operator, unless
 from ..unit.base_classes import UnitOperator, ValidUnitOperator
 from ..unit.properties import to_unit
@@ -56,7 +56,9 @@ def obstacle(operator, context, root, friction):
 @operator(
     ValidUnitOperator,
     "Add Box",
-    size=Numbers("Size (mm)", "Edges of the box in mm", subtype="XYZ", default=(25.0, 25.0, 25.0), min=0.1),
+    size=FloatVector(
+        "Size (mm)", "Edges of the box in mm", subtype="XYZ", default=(25.0, 25.0, 25.0), min=0.1
+    ),
     gap=Number("Gap (mm)", "Distance between unit and box in mm", default=5.0, min=0.0),
     friction=blender_property(FRICTION, precision=2),
 )

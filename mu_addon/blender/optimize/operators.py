@@ -5,7 +5,7 @@ import attrs
 from ...errors import InputError
 from ..jobs.operators import job_operators
 from ..shared import landing
-from ..shared.blender_property import Choice, Count
+from ..shared.blender_property import Choice, Integer
 from ..shared.operators import operator, unless
 from ..unit import object as unit_object
 from ..unit.base_classes import UnitOperator, ValidUnitOperator
@@ -40,7 +40,9 @@ FIRST = (
 """Order in which the list proposes parameters: those with most effect on a unit's angle come first."""
 
 
-@operator(UnitOperator, "Remove from List", what=_LIST, index=Count("Row", "Row of the list, from 0", min=0))
+@operator(
+    UnitOperator, "Remove from List", what=_LIST, index=Integer("Row", "Row of the list, from 0", min=0)
+)
 def optimize_unlist(root, what, index):
     """Remove a target, or a parameter that may change, from the unit's list"""
     rows = getattr(root.mu_optimize, what)
@@ -61,7 +63,7 @@ class _OfProposed(UnitOperator):
     trouble = unless(optimization.proposed, "No unit is proposed: run the optimisation first")
 
 
-_NUMBER = Count("Proposed Unit", "Number of the proposed unit", default=1, min=1)
+_NUMBER = Integer("Proposed Unit", "Number of the proposed unit", default=1, min=1)
 
 
 @operator(_OfProposed, "Apply", number=_NUMBER)

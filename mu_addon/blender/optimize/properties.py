@@ -18,8 +18,8 @@ from ...optimization.target_kinds import GAP, KINDS, PRESSURE
 from ..shared.blender_property import (
     Choice,
     Flag,
+    FloatVector,
     Number,
-    Numbers,
     Text,
     blender_property,
     exact,
@@ -65,7 +65,7 @@ class MU_PG_target(bpy.types.PropertyGroup):
         items=[(name, name.replace("_", " ").title(), sentence(kind.text)) for name, kind in KINDS.items()],
     )
     pressure_kPa: blender_property(PRESSURE, name="At (kPa)", precision=1, step=100)
-    pressures_kPa: Numbers(
+    pressures_kPa: FloatVector(
         "At (kPa)",
         "Two gauge pressures over which it is taken",
         size=2,

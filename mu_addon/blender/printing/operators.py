@@ -4,7 +4,7 @@ from ...design.settings import UP
 from ...errors import InputError
 from ..jobs.operators import FILES, RUN_FILES, job_operators
 from ..shared import viewports
-from ..shared.blender_property import Count, Flag, Numbers
+from ..shared.blender_property import Flag, FloatVector, Integer
 from ..shared.operators import operator, unless
 from ..unit import object as unit_object
 from ..unit.base_classes import UnitOperator, ValidUnitOperator
@@ -93,8 +93,8 @@ def print_clear(root):
 @operator(
     _OfCheck,
     "Show Finding",
-    finding=Count("Finding", "Its number in the list, from 0", min=0, options={"SKIP_SAVE"}),
-    place=Count(
+    finding=Integer("Finding", "Its number in the list, from 0", min=0, options={"SKIP_SAVE"}),
+    place=Integer(
         "Place",
         "Number of the place, from 0; -1: the one after that shown",
         default=-1,
@@ -129,7 +129,7 @@ def print_show(context, root, finding, place, view):
 @operator(
     UnitOperator,
     "Use Direction",
-    direction=Numbers(
+    direction=FloatVector(
         "Up", "Away from the platform, in the unit's frame", subtype="XYZ", default=UP, options={"SKIP_SAVE"}
     ),
 )

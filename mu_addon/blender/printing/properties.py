@@ -7,7 +7,7 @@ from bpy.props import IntProperty
 
 from ...design.assets import asset_names
 from ...design.settings import FINE, PRINTER, UP
-from ..shared.blender_property import Choice, Flag, Number, Numbers, blender_property, path_property
+from ..shared.blender_property import Choice, Flag, FloatVector, Number, blender_property, path_property
 from ..shared.registration import property_of
 from . import layer, marks
 
@@ -46,7 +46,7 @@ class MU_PG_printing(bpy.types.PropertyGroup):
     limits_file: path_property(
         "Measured", "limits.csv of the specimens, filled in: limits that were measured on printed parts"
     )
-    up: Numbers(
+    up: FloatVector(
         "Up",
         "Build direction in the unit's frame, away from the platform. 0 0 1: inlet down",
         subtype="XYZ",

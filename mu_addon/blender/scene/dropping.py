@@ -13,7 +13,7 @@ from ...errors import InputError
 from ...reading import parse_toml, text_in
 from ..preview import skeletons
 from ..shared import landing, viewports
-from ..shared.blender_property import Numbers, Text
+from ..shared.blender_property import FloatVector, Text
 from ..shared.operators import FreeOperator, operator
 from ..unit import object as unit_object
 from ..unit.base_classes import UnitOperator
@@ -49,7 +49,7 @@ def _at_the_mouse(operator, context, event):
     "Unit or Node Tree",
     invoke=_at_the_mouse,
     filepath=_FILE,
-    place=Numbers("Place", "Where it was dropped", options={"HIDDEN", "SKIP_SAVE"}),
+    place=FloatVector("Place", "Where it was dropped", options={"HIDDEN", "SKIP_SAVE"}),
 )
 def drop_toml(operator, context, filepath, place):
     """Add the unit that a TOML file describes where it is dropped, or open the node tree that it holds"""

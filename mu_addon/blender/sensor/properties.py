@@ -6,7 +6,7 @@ import bpy
 from bpy.props import StringProperty
 
 from ...sensing.settings import BAUD, PORT, SPEED
-from ..shared.blender_property import Choice, Count, Flag, Number, Text, blender_property, path_property
+from ..shared.blender_property import Choice, Flag, Integer, Number, Text, blender_property, path_property
 from ..shared.registration import property_of
 from . import state as sensor
 
@@ -69,7 +69,7 @@ class MU_PG_sensor(bpy.types.PropertyGroup):
     sweep_from: Number("First (deg)", "Where a sweep begins and ends", default=0.0)
     sweep_to: Number("Last (deg)", "Where a sweep turns", default=45.0)
     sweep_step: Number("Step (deg)", "From one held angle to the next", default=15.0, min=0.5)
-    sweep_times: Count(
+    sweep_times: Integer(
         "Times", "Number of sweeps back and forth: two show how well it repeats", default=2, min=2
     )
     known_deg: Number("Angle (deg)", "The angle at which the unit is held now")

@@ -77,7 +77,7 @@ def _described(make: Callable[..., Any]) -> Callable[..., Any]:
 
 
 Flag, Text, Choice = map(_described, (BoolProperty, StringProperty, EnumProperty))
-Number, Numbers, Count = map(_described, (FloatProperty, FloatVectorProperty, IntProperty))
+Number, FloatVector, Integer = map(_described, (FloatProperty, FloatVectorProperty, IntProperty))
 """Properties that no setting of the core describes, by name and description."""
 
 

@@ -10,7 +10,7 @@ from ...errors import InputError
 from ...measured.bench import Bench, MarkerSettings
 from ...measured.kinds import ROLES
 from ...measured.video import View
-from ..shared.blender_property import Choice, Flag, Number, Numbers, Text, exact, path_property
+from ..shared.blender_property import Choice, Flag, FloatVector, Number, Text, exact, path_property
 from ..shared.registration import property_of
 
 
@@ -19,7 +19,7 @@ def _track(name: str, description: str):
 
 
 def _place(name: str):
-    return Numbers(
+    return FloatVector(
         name,
         "Its y (toward more lattice) and z (along the axis) in the unit's frame, mm",
         size=2,

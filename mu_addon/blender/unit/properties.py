@@ -21,8 +21,8 @@ from ...simulate_and_place.settings import ALL_PATHS, ORIENTATION, PATHS, PROTOC
 from ..shared.blender_property import (
     BESIDE_BLEND_FILE,
     Choice,
-    Count,
     Flag,
+    Integer,
     Text,
     blender_property,
     exact,
@@ -141,7 +141,7 @@ class MU_PG_unit(bpy.types.PropertyGroup):
         },
         "study": PointerProperty(type=MU_PG_study, description="Stages of the next simulation"),
         "stack": CollectionProperty(type=MU_PG_step, description="Steps of the design, in their order"),
-        "step": Count("Step", "The step whose parameters are shown"),
+        "step": Integer("Step", "The step whose parameters are shown"),
         # Name and values of the resin that was chosen, see `resins`.
         "resin": StringProperty(options={"HIDDEN"}),
         "path": Text("Sensor Path", "Window of anchors that the waveguide follows", update=_changed),
