@@ -44,14 +44,14 @@ def _add(commands: Commands[Any], kind: type[Study], name: str) -> None:
         command.add_argument("file", metavar="FILE", help=kind.from_file[0])
     groups: dict[str, Any] = {"": command}
     for one in _asked(kind, name).values():
-        if one.group not in groups:
-            groups[one.group] = command.add_argument_group(one.group)
+        if one.title not in groups:
+            groups[one.title] = command.add_argument_group(one.title)
         if one.descriptions:
-            _add_values(groups[one.group], one)
+            _add_values(groups[one.title], one)
             if kind.from_file[0]:
                 command.set_defaults(**{_dest(one): None})
         elif one.kind in OBJECTS:
-            OBJECTS[one.kind][0](groups[one.group], one)
+            OBJECTS[one.kind][0](groups[one.title], one)
     add_results(command)
     if not kind.joins:
         words = "Compute the numbers only: no pictures, no report.html."

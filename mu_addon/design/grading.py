@@ -18,7 +18,7 @@ from numpy.typing import ArrayLike
 
 from ..arrays import Array
 from .factor_list import LEAST, MOST, FactorList
-from .quantity import quantity, text_quantity
+from .quantity import Groups, quantity, text_quantity
 
 ALONG_Z = ("base", "lower", "middle", "upper", "tip")
 """Parameters along the axis, evenly spaced from the middle of the first chamber to that of the last."""
@@ -73,6 +73,7 @@ class Grading:
     """
 
     section: ClassVar[str] = "grading"
+    advanced: ClassVar[Groups] = {"grading": ()}
 
     base: float = _factor("in the middle of the first chamber and below")
     lower: float = _factor("a quarter of the way from the first chamber's middle to the last's")

@@ -19,9 +19,9 @@ from .assets import asset_file, asset_names
 from .dimensions import Dimensions
 from .grading import Field, Grading
 from .printed import as_printed
-from .quantity import PAPER, Description, choice, describe, in_MPa, quantity, text_quantity
+from .quantity import PAPER, Description, Groups, choice, describe, in_MPa, quantity, text_quantity
 from .wall_factors import WALLS, factors_by_chamber
-from .wall_material import Wall, require_used
+from .wall_material import OF_RESIN, Wall, require_used
 
 FORMAT = 1
 # Up to here a printed body's angles depend on its mesh as they do at 0.45, in half as much time again.
@@ -33,6 +33,16 @@ class Chambers:
     """Section [chambers]: the actuator, a bellows of parabolic bladders and necks around z; in mm."""
 
     section: ClassVar[str] = "chambers"
+    advanced: ClassVar[Groups] = {
+        "profile": ("bladder_share", "wall_factors"),
+        "caps and inlet": (
+            "base_cap_mm",
+            "tip_cap_mm",
+            "inlet_diameter_mm",
+            "inlet_length_mm",
+            "inlet_wall_mm",
+        ),
+    }
 
     count: int = quantity(6, "", 3, 24, "number of chambers in series", PAPER)
     cell_mm: float = quantity(12.5, "mm", 4.0, 60.0, "lattice cell U, which is also the chamber pitch", PAPER)
@@ -124,6 +134,7 @@ class Envelope:
     """Section [lattice]: kind of cell, numbers of cells around the actuator, and strut diameters in mm."""
 
     section: ClassVar[str] = "lattice"
+    advanced: ClassVar[Groups] = {"custom cell and symmetry": ("struts", "allow_symmetric")}
 
     kind: str = choice("body-centred", lattice_kinds.names, "kind of lattice cell", PAPER)
     struts: str = text_quantity(
@@ -196,6 +207,24 @@ class Waveguide:
     """Section [waveguide]: the optical waveguide along the anchors; in mm, the same at every scale."""
 
     section: ClassVar[str] = "waveguide"
+    advanced: ClassVar[Groups] = {
+        "section and wells": (
+            "section_mm",
+            "well_width_mm",
+            "well_depth_mm",
+            "end_mm",
+            "inclusion_radius_mm",
+        ),
+        "seats": (
+            "seats",
+            "part_length_mm",
+            "part_width_mm",
+            "part_height_mm",
+            "seat_clearance_mm",
+            "seat_wall_mm",
+            "cable_mm",
+        ),
+    }
 
     row: int = quantity(
         2,
@@ -300,6 +329,7 @@ class Printing:
     """Section [print]: difference of the printed part from the nominal one; in mm, equal at every scale."""
 
     section: ClassVar[str] = "print"
+    advanced: ClassVar[Groups] = {"print offsets and skin": ()}
 
     offset_xy_mm: float = quantity(
         0.0,
@@ -343,6 +373,7 @@ class Material:
     """Section [material]: elastic constants at small strain, moduli in kPa."""
 
     section: ClassVar[str] = "material"
+    advanced: ClassVar[Groups] = OF_RESIN
 
     lattice_modulus_kPa: float = quantity(
         18.34,

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from typing import TYPE_CHECKING, Any, NamedTuple, TypeVar
 
 import attrs
@@ -17,6 +17,8 @@ if TYPE_CHECKING:
 PAPER = "paper"
 
 Number = TypeVar("Number", float, "np.ndarray[Any, Any]")
+Groups = Mapping[str, tuple[str, ...]]
+"""Names of the advanced parameters of a section by the title of their group; none for all of the section."""
 
 
 def in_MPa(value_kPa: Number) -> Number:
@@ -41,7 +43,8 @@ class Description(NamedTuple):
     """Description of one parameter: type, default, unit, closed bounds in that unit, meaning and source.
 
     fixed: it is a length that is the same at every scale. A choice among names has `choices` and no bounds, a
-    text (of type str) neither.
+    text (of type str) neither. group: of an advanced one, the title below which help and panels fold it; ""
+    of a usual one.
     """
 
     name: str
@@ -54,6 +57,7 @@ class Description(NamedTuple):
     source: str
     fixed: bool
     choices: tuple[str, ...] = ()
+    group: str = ""
 
     @property
     def allowed(self) -> str:
@@ -119,9 +123,10 @@ def described(
     low: float = math.nan,
     high: float = math.nan,
     choices: tuple[str, ...] = (),
+    group: str = "",
 ) -> Description:
     """A setting of a job, stated once: its field, option, property and node setting are made from this."""
-    return Description(name, type(default), default, unit, low, high, text, "", False, choices)
+    return Description(name, type(default), default, unit, low, high, text, "", False, choices, group)
 
 
 def quantity(
@@ -180,8 +185,15 @@ def _of_field(field: Any) -> Description:
 
 
 def describe(section: type) -> Iterator[Description]:
-    """Descriptions of the parameters of an attrs class, in order; fields without a source are left out."""
-    return (_of_field(field) for field in attrs.fields(section) if "described" in field.metadata)
+    """Descriptions of the parameters of an attrs class, in order; fields without a source are left out.
+
+    Its `advanced`, of type `Groups`, says which of them have a group.
+    """
+    advanced = getattr(section, "advanced", {}).items()
+    for field in attrs.fields(section):
+        if "described" in field.metadata:
+            titles = (title for title, names in advanced if not names or field.name in names)
+            yield _of_field(field)._replace(group=next(titles, ""))
 
 
 def where(instance: Any, name: str) -> str:

@@ -7,6 +7,8 @@ from .quantity import described
 USUAL_RESIN = "elastic-50a-v1"
 PRESET = "mu-1.0x"
 """Unit where none is given."""
+SOLVER = "mesh and solver"
+"""Group of advanced settings of many jobs."""
 UP = (0.0, 0.0, 1.0)
 """Usual build direction in the unit's frame: inlet toward the platform."""
 QUALITY = described(

@@ -9,9 +9,10 @@ import attrs
 
 from ..errors import InputError
 from .declared_laws import wall_laws, wall_parameters
-from .quantity import choice, quantity
+from .quantity import Groups, choice, quantity
 
 DEFAULT = "neo-hooke"
+OF_RESIN: Groups = {"constants of the resin": ()}
 
 
 def _fields_of_laws() -> dict[str, Any]:
@@ -38,6 +39,7 @@ class Wall(_OfLaws):
     """
 
     section: ClassVar[str] = "wall"
+    advanced: ClassVar[Groups] = OF_RESIN
 
     layers_excess: float = quantity(
         0.0,

@@ -8,6 +8,7 @@ from typing import Any
 import attrs
 
 from ..design.quantity import described
+from ..design.settings import SOLVER
 from ..errors import InputError
 
 
@@ -21,6 +22,7 @@ DEVICE = described(
     "device",
     "cpu",
     "device of the finite elements: cpu, by factorisation, or a CUDA device, by conjugate gradients",
+    group=SOLVER,
 )
 
 

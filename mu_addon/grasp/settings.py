@@ -6,10 +6,8 @@ import attrs
 
 from ..design.quantity import described
 from ..design.settings import FRICTION
-from ..errors import InputError
 
-MOST_SIDE_MM = 200.0
-
+SIDE = described("side_mm", 25.0, "side of the cube", unit="mm", low=0.1, high=200.0)
 STEP_S = 0.5
 """Longest interval between instants in s."""
 DENSITY = described(
@@ -25,13 +23,6 @@ BEYOND = described(
 )
 
 
-def _side(_: object, field: attrs.Attribute[float], value: float) -> None:
-    if not 0.0 < value <= MOST_SIDE_MM:
-        raise InputError(
-            f"a cube with a side length of {value:g}", field.name, f"give mm, above 0 to {MOST_SIDE_MM:g}"
-        )
-
-
 @attrs.frozen
 class Cube:
     """A rigid cube: its side in mm, and its density in g/ml.
@@ -40,7 +31,7 @@ class Cube:
     lighter.
     """
 
-    side_mm: float = attrs.field(validator=_side)
+    side_mm: float = SIDE.field()
     density_g_per_ml: float = DENSITY.field()
 
     @property

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from ..design.quantity import described
+from ..design.settings import SOLVER
 from ..meshing.settings import REFINE as REFINEMENT
 from ..meshing.settings import SELF_CONTACT as KEPT_APART
 
@@ -27,13 +28,14 @@ WORKERS = described(
     low=1,
     high=256,
 )
-REFINE = REFINEMENT._replace(default=0.5)
+REFINE = REFINEMENT._replace(default=0.5, group=SOLVER)
 CHECK_REFINE = described(
     "check_refine",
     FINER * REFINE.default,
     "mesh refinement of the check of a proposed unit",
     low=REFINE.low,
     high=REFINE.high,
+    group=SOLVER,
 )
 ROBUST = described(
     "robust", False, "ask for units that meet the targets within the uncertainty of mesh, print and resin"

@@ -72,10 +72,10 @@ class Input:
     it is not that of the description; argument: what stands for it where it is no option but a word in its
     place; required: no command does without the option; repeated: the option may stand several times, and
     the value is a list; metavar: stands for its value there; many: it takes several words, or so many;
-    alone: its value where the option stands without one; path: "file" or "folder" if it names one; group:
-    title over its option in help; target: the first of a study's targets that has it; value: makes the input
-    of its plain value, where they differ, and raises InputError. An input of another kind overrides `made`,
-    `write` and `read`.
+    alone: its value where the option stands without one; path: "file" or "folder" if it names one; group: as
+    that of its description, which may say none; target: the first of a study's targets that has it; value:
+    makes the input of its plain value, where they differ, and raises InputError. An input of another kind
+    overrides `made`, `write` and `read`.
     """
 
     kind: str
@@ -92,6 +92,11 @@ class Input:
     group: str = ""
     target: str = ""
     value: Callable[[Any], Any] | None = None
+
+    @property
+    def title(self) -> str:
+        """Title below which faces fold it; "" for a usual one, which they always show."""
+        return self.group or (self.descriptions[0].group if self.descriptions else "")
 
     def made(self, values: tuple[Any, ...], given: Mapping[str, Any]) -> Any:
         """The input of its plain values; given: the inputs before it. Raises InputError."""

@@ -10,7 +10,9 @@ from typing import Any
 
 from ..design.quantity import described
 from ..design.settings import ORIENTATION as HUNG
+from ..design.settings import SOLVER
 from ..meshing.settings import REFINE
+from ..placement.settings import OF_LATTICE
 
 STAGES = ("design", "simulate", "place")
 """Stages in order of need; a study has the first, the first two or all."""
@@ -19,11 +21,16 @@ PROTOCOL = described(
     "",
     "pressure protocol, CSV with the columns time_s,pressure_kPa; empty: the shipped grasp protocol",
 )
-TIMES = described("times", 13, "number of time samples of the protocol", low=2, high=1001)
-STATIONS = described("stations", 51, "number of stations along the backbone", low=2, high=10_001)
+TIMES = described("times", 13, "number of time samples of the protocol", low=2, high=1001, group=SOLVER)
+STATIONS = described(
+    "stations", 51, "number of stations along the backbone", low=2, high=10_001, group=SOLVER
+)
 WORKERS = described("workers", 2, "number of worker processes; results do not depend on it", low=1, high=256)
 MESH_CHECK = described(
-    "mesh_check", True, "solve a second mesh, from which the mesh uncertainty of the ranking is estimated"
+    "mesh_check",
+    True,
+    "solve a second mesh, from which the mesh uncertainty of the ranking is estimated",
+    group=SOLVER,
 )
 PATHS = described(
     "paths",
@@ -37,9 +44,10 @@ ALL_PATHS = described(
     False,
     "solve every path at every pressure; else a path is left, with a lower bound, once it certainly deviates "
     "more than the best",
+    group=SOLVER,
 )
 UNDER_PRESSURE = described(
-    "under_pressure", False, "leave out the protocol's suction: the unit is then at rest"
+    "under_pressure", False, "leave out the protocol's suction: the unit is then at rest", group=SOLVER
 )
 QUICK = described(
     "quick",
@@ -48,7 +56,12 @@ QUICK = described(
 )
 QUICK_REFINE = 0.35
 CHECKS = described(
-    "checks", 100, "largest number of paths of the lattice solved by the full model", low=2, high=100_000
+    "checks",
+    100,
+    "largest number of paths of the lattice solved by the full model",
+    low=2,
+    high=100_000,
+    group=OF_LATTICE,
 )
 SELF_FRICTION = described(
     "self_friction",
@@ -57,6 +70,7 @@ SELF_FRICTION = described(
     "is solved in time order",
     low=0,
     high=5,
+    group=SOLVER,
 )
 ORIENTATION = HUNG._replace(text=f"{HUNG.text}; it has an effect only with gravity in the extended model")
 ESTIMATED = "J_hat_estimated_mm"

@@ -193,7 +193,13 @@ class Check(Study):
     direction: tuple[float, ...] = given(
         NumbersInput(
             descriptions=tuple(
-                described(f"up_{axis}", part, "build direction, away from the platform", low=-1e3, high=1e3)
+                described(
+                    f"up_{axis}",
+                    part,
+                    "build direction in the unit's frame, away from the platform; 0 0 1: inlet down",
+                    low=-1e3,
+                    high=1e3,
+                )
                 for axis, part in zip("xyz", UP, strict=True)
             ),
             option="up",

@@ -69,7 +69,7 @@ class Track(Study):
         described(
             "frame_rate",
             0.0,
-            "frame rate in frames per second; empty: as given in FILE or in the clip",
+            "frames per second; 0: that of the description or the clip, which is wrong in slow motion",
             low=0.0,
             high=1e6,
         ),

@@ -13,6 +13,7 @@ from .. import simulate_and_place as core
 from ..design.quantity import described
 from ..design.settings import FRICTION
 from ..errors import InputError
+from ..placement.settings import OF_LATTICE
 from ..run.study import Found, Input, Written
 from ..sensing.optics import Optics
 from ..simulate_and_place.settings import PROTOCOL
@@ -25,6 +26,7 @@ LIGHT = described(
     "",
     "optical constants of the resin; empty: assumed, "
     + ", ".join(f"{name} {value:g}" for name, value in attrs.asdict(Optics()).items()),
+    group=OF_LATTICE,
 )
 
 

@@ -22,7 +22,7 @@ from ..simulate_and_place.settings import SELF_FRICTION, TIMES, UNDER_PRESSURE, 
 from .inputs import OnceInput, UnitInput, asked
 from .unit_inputs import BodyInput, EffectsInput, ObstaclesInput, ProtocolInput, grasp
 
-AROUND, SOLVER = "unit and surroundings", "mesh and solver"
+AROUND = "unit and surroundings"
 STAGES = ("design", "simulate", "place")
 
 
@@ -139,17 +139,17 @@ class UnitMotion(Study):
     )
     effects: core.NamedEffects = given(EffectsInput(group=AROUND), factory=lambda: core.NamedEffects())
     obstacles: tuple[design.RigidBody, ...] = given(ObstaclesInput(group=AROUND), default=(), converter=tuple)
-    times: int = setting(TIMES, metavar="K", group=SOLVER, target="simulate")
-    under_pressure: bool = setting(UNDER_PRESSURE, group=SOLVER, target="simulate")
+    times: int = setting(TIMES, metavar="K", target="simulate")
+    under_pressure: bool = setting(UNDER_PRESSURE, target="simulate")
     # A command asks for it by default; of a call that does not name it, nothing slow is expected.
     self_contact: bool = given(
-        Input("setting", (SELF_CONTACT,), group=SOLVER, target="simulate"),
+        Input("setting", (SELF_CONTACT,), target="simulate"),
         default=False,
         converter=SELF_CONTACT.checked,
     )
-    self_friction: float = setting(SELF_FRICTION, metavar="MU", group=SOLVER, target="simulate")
+    self_friction: float = setting(SELF_FRICTION, metavar="MU", target="simulate")
     device: str = given(
-        Input("setting", (DEVICE,), decides=False, metavar="cpu|cuda:0", group=SOLVER, target="simulate"),
+        Input("setting", (DEVICE,), decides=False, metavar="cpu|cuda:0", target="simulate"),
         default=DEVICE.default,
         validator=known_device,
     )

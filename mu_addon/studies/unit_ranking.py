@@ -32,9 +32,8 @@ from ..simulate_and_place.settings import ALL_PATHS, CHECKS, MESH_CHECK, PATHS, 
 from .inputs import OnceInput
 from .parameter_study.results import angles_of
 from .unit_inputs import LIGHT, optics_of
-from .unit_motion import SOLVER, UnitMotion, state_message, state_sought, timed, wants
+from .unit_motion import UnitMotion, state_message, state_sought, timed, wants
 
-LATTICE = "paths, and limits of --paths graph"
 COARSER = 0.7
 """Refinement of a coarser mesh, by which the mesh uncertainty of a ranking is estimated, over its own."""
 PATHS_CHECKED = 3
@@ -184,26 +183,25 @@ class UnitStudy(UnitMotion):
     }
 
     quick: bool = given(OnceInput(descriptions=(QUICK,), target="place"), default=QUICK.default)
-    stations: int = setting(STATIONS, metavar="J", group=SOLVER, target="place")
-    mesh_check: bool = setting(MESH_CHECK, group=SOLVER, target="place")
-    all_paths: bool = setting(ALL_PATHS, decides=False, group=SOLVER, target="place")
-    paths: str = setting(PATHS, group=LATTICE, target="place")
+    stations: int = setting(STATIONS, metavar="J", target="place")
+    mesh_check: bool = setting(MESH_CHECK, target="place")
+    all_paths: bool = setting(ALL_PATHS, decides=False, target="place")
+    paths: str = setting(PATHS, target="place")
     optics: Optics = given(
         Input(
             "optics",
             (LIGHT,),
             many=True,
             metavar="NAME=VALUE",
-            group=LATTICE,
             target="place",
             value=optics_of,
         ),
         factory=Optics,
     )
-    shortest_cells: float = setting(SHORTEST, metavar="C", group=LATTICE, target="place")
-    longest_cells: float = setting(LONGEST, metavar="C", group=LATTICE, target="place")
-    bend_deg: float = setting(BEND, metavar="A", group=LATTICE, target="place")
-    checks: int = setting(CHECKS, metavar="N", group=LATTICE, target="place")
+    shortest_cells: float = setting(SHORTEST, metavar="C", target="place")
+    longest_cells: float = setting(LONGEST, metavar="C", target="place")
+    bend_deg: float = setting(BEND, metavar="A", target="place")
+    checks: int = setting(CHECKS, metavar="N", target="place")
 
     def refusals(self) -> Iterator[tuple[bool, str, str, str]]:
         """Pairs of settings that exclude each other, and a body that its paths leave."""

@@ -17,7 +17,8 @@ def page():
             default = str(d.default).lower() if d.type in (bool, str) else f"{d.default:g}"
             text = f"{d.text}{' *' if d.fixed else ''}"
             source = "assumed" if d.assumed else "paper"
-            name = f"`{section.section}.{d.name}`"
+            bold = "" if d.group else "**"
+            name = f"{bold}`{section.section}.{d.name}`{bold}"
             rows.append(f"| {name} | {default} | {d.unit} | {d.allowed} | {text} | {source} |\n")
     return PAGE.read_text(encoding="utf-8").partition(HEAD)[0] + HEAD + "".join(rows)
 

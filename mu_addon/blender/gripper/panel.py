@@ -5,11 +5,10 @@ from __future__ import annotations
 import bpy
 
 from ...design.gripper import SECTIONS
-from ...design.quantity import describe
 from ...grasp.phases import WORDS
 from ..jobs.panel import draw_job, open_buttons
-from ..shared.panels import RootPanel, alert, plain_row, wrapped
-from ..unit.fields import field
+from ..shared.panels import RootPanel, alert, draw_settings, fields_of, plain_row, wrapped
+from ..unit.fields import draw_section
 from . import object as gripper_object
 from . import state as grasps
 from . import timeline
@@ -36,11 +35,8 @@ class MU_PT_gripper(GripperPanel, bpy.types.Panel):
             alert(layout, props.trouble)
         layout.prop(props, "paths")
         for section in SECTIONS:
-            column = layout.column(align=True)
-            column.label(text=section.section.capitalize())
-            for d in describe(section):
-                group = getattr(props, section.section)
-                column.prop(group, field(group, d))
+            layout.label(text=section.section.capitalize())
+            draw_section(layout, props, section)
 
 
 class MU_PT_grasp(GripperPanel, bpy.types.Panel):
@@ -53,13 +49,9 @@ class MU_PT_grasp(GripperPanel, bpy.types.Panel):
         props = root.mu_gripper
         layout.prop(props, "detail")
         if props.detail != "part":
-            column = layout.column(align=True)
-            column.prop(props, "cube_mm")
+            draw_settings(layout, fields_of(props))
             if gripper_object.part(root, "cube") is not None:
-                column.prop(props, "cube_height")
-            column.prop(props, "density_g_per_ml")
-            column.prop(props, "friction")
-            layout.prop(props, "self_contact")
+                layout.prop(props, "cube_height")
         name = "Make the Part" if props.detail == "part" else "Grasp"
         words = grasps.GRASPING.label(root, name)
         draw_job(layout, root, grasps.GRASP, "mu.grasp", "PLAY", words)

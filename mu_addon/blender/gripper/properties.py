@@ -9,14 +9,12 @@ from ...design import parameters
 from ...design.gripper import SECTIONS, Gripper
 from ...design.quantity import describe
 from ...design.settings import FRICTION
-from ...grasp.settings import DENSITY
+from ...grasp.settings import DENSITY, SIDE
 from ...meshing.settings import SELF_CONTACT
 from ..shared import displays
 from ..shared.blender_property import (
-    MILLIMETRES,
     Choice,
     Flag,
-    Number,
     blender_property,
     exact,
     millimetres,
@@ -74,15 +72,7 @@ class MU_PG_gripper(bpy.types.PropertyGroup):
             "Show the fingers cut in their bending plane, to see chambers and wall",
             update=_changed,
         ),
-        "cube_mm": Number(
-            "Cube",
-            "Side of the grasped cube, in the middle between the tips",
-            subtype=MILLIMETRES,
-            default=25.0,
-            min=1.0,
-            max=199.0,
-            update=_changed,
-        ),
+        "cube_mm": blender_property(SIDE, _changed, name="Cube"),
         "cube_height": millimetres(
             10,
             name="Cube Height",

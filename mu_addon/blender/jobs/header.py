@@ -7,12 +7,12 @@ header.
 # Blender reads the annotations themselves: no `from __future__ import annotations` here.
 
 import bpy
-from bpy.props import StringProperty
 
 from ...errors import InputError
 from ...run.child import CANCELLED, DONE, WAITING
 from ...run.progress import spell
 from ..shared import viewports
+from ..shared.blender_property import Text
 from ..shared.operators import FreeOperator, operator
 from ..shared.registration import at_end, at_start, handler, menu
 from . import start_child
@@ -44,7 +44,7 @@ def _which(context, properties) -> str:
     "Cancel Job",
     undo=False,
     tip=_which,
-    key=StringProperty(name="Job", description="Key of the job", options={"HIDDEN"}),
+    key=Text("Job", "Key of the job", options={"HIDDEN"}),
 )
 def job_cancel(key):
     """Stop this job, or take it out of the queue; finished stages are kept"""

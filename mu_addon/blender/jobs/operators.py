@@ -6,11 +6,10 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
-from bpy.props import EnumProperty
-
 from ...errors import InputError
 from ...run.child import ERRORS
 from ..shared import viewports
+from ..shared.blender_property import Choice
 from ..shared.operators import open_file, operator, unless
 from ..unit.base_classes import UnitOperator
 from .start_child import OWN_FOLDER, JobKind
@@ -61,7 +60,7 @@ def job_operators(
         open_file(context, path)
 
     runs = unless(kind.is_running, f"No {noun} is running")
-    choice = EnumProperty(name="What", description=f"File or folder of the {noun} to open", items=items)
+    choice = Choice("What", f"File or folder of the {noun} to open", items=items)
     made("cancel", f"Stop the {noun}; {kept}", cancel, trouble=runs)
     made("dismiss", f"Remove the message of the ended {noun} from the panel", lambda root: kind.dismiss(root))
     made("open", f"Open a file or the folder of the {noun}", show, what=choice)

@@ -3,8 +3,8 @@
 # Blender reads the annotations themselves: no `from __future__ import annotations` here.
 
 import bpy
-from bpy.props import BoolProperty
 
+from ..shared.blender_property import Flag
 from ..shared.compat import user_folder
 from ..shared.panels import wrapped
 from .start_child import PACKAGE
@@ -18,9 +18,9 @@ class MU_AP_preferences(bpy.types.AddonPreferences):
 
     bl_idname = PACKAGE
 
-    jobs_go_on: BoolProperty(
-        name="Runs Go On When Blender Is Closed",
-        description="Simulations, grasps, diagnoses and node trees continue when Blender is closed, and "
+    jobs_go_on: Flag(
+        "Runs Go On When Blender Is Closed",
+        "Simulations, grasps, diagnoses and node trees continue when Blender is closed, and "
         "the next session shows them. Off: they end with Blender, and finished stages are kept. Jobs "
         "that are waiting end in either case",
         default=True,

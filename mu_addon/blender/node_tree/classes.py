@@ -5,18 +5,21 @@ A node added to the core appears with its sockets, fields, bounds and tooltips w
 
 # Blender reads the annotations themselves: no `from __future__ import annotations` here.
 
+from functools import partial
+
 import bpy
 from bpy.props import PointerProperty, StringProperty
 
-from ...graph.definition import FOLDER, Definition, Setting
+from ...design.parameters import SECTIONS
+from ...graph.definition import Definition, Setting
 from ...graph.evaluation import BLOCKED, CACHED, COMPUTED, FAILED, MADE, MUTED, WAITING
 from ...nodes.definitions import definitions
 from ...run.progress import spell
 from ..shared.blender_property import Flag, blender_property, path_property
-from ..shared.panels import wrapped
+from ..shared.panels import Field, draw_settings, wrapped
 from ..shared.updates import Signal
-from ..shared.wording import label, sentence, tooltip
-from ..unit.fields import field, tied_update
+from ..shared.wording import label, sentence
+from ..unit.fields import draw_section, tied_update
 from . import sockets
 
 TREE = "MuNodeTree"
@@ -165,31 +168,28 @@ class _CoreNode(_Node):
         else:
             layout.prop(self, name)
 
+    def _draw_field(self, layout, s):
+        # A number's label stands within its field, where "Base Cap (mm)" is not cut.
+        column = layout.column()
+        column.use_property_split = not s.is_number
+        column.prop(self, attribute(s))
+
     def draw_buttons_ext(self, context, layout):
         wrapped(layout, sentence(self.definition.text))
-        for s in self.definition.settings:
-            if s.shown:
-                column = layout.column()
-                # A number's label stands within its field, where "Base Cap (mm)" is not cut.
-                column.use_property_split = self.bl_rna.properties[attribute(s)].type not in ("FLOAT", "INT")
-                column.prop(self, attribute(s))
+        shown = [s for s in self.definition.settings if s.shown]
+        draw_settings(layout, [Field(s.description, partial(self._draw_field, s=s)) for s in shown])
         if getattr(self, "source", None):
             draw_source(self, layout)
 
 
 def draw_source(node, layout) -> None:
     """Draw the parameters of the scene's unit that a node shows: the same fields as the unit's sidebar."""
-    from ...design.parameters import SECTIONS, describe
-
     props = node.source.mu_unit
     layout.prop(props, "title")
     layout.prop(props, "scale")
     for section in SECTIONS:
         layout.label(text=section.section.capitalize())
-        column = layout.column(align=True)
-        group = getattr(props, section.section)
-        for d in describe(section):
-            column.prop(group, field(group, d))
+        draw_section(layout, props, section)
 
 
 def draw_state(node, layout) -> None:
@@ -225,7 +225,7 @@ def _property(s: Setting):
     """Blender property of a setting; the parameters of a unit are coupled as in its sidebar."""
     d, update = s.description, tied_update(s.name, _changed)
     if s.path:
-        return path_property(label(d), tooltip(d), s.path == FOLDER, default=d.default, update=update)
+        return blender_property(d, update, path=s.path)
     if d.type is not float:
         items = [(name, name.replace("_", " "), sentence(d.text)) for name in d.choices or ()]
         return blender_property(d, update, set() if s.shown else {"HIDDEN"}, items=items)

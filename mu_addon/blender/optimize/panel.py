@@ -11,7 +11,7 @@ from ...optimization.target_kinds import KINDS
 from ...studies.optimize import FRONT
 from ..jobs.panel import draw_job, open_buttons, timed
 from ..shared.file_cache import icon_of
-from ..shared.panels import alert, fold, wrapped
+from ..shared.panels import alert, draw_settings, fields_of, wrapped
 from ..shared.wording import in_panel, label
 from ..unit.base_classes import UnitPanel
 from . import state as optimization
@@ -40,8 +40,8 @@ class MU_PT_optimize(UnitPanel, bpy.types.Panel):
         else:
             _targets(layout, props)
             _freedoms(layout, root, props)
-            layout.prop(props, "evaluations")
-            _more(layout, props)
+            layout.prop(props, "has_gravity")
+            draw_settings(layout, fields_of(props, () if props.has_gravity else {"orientation_deg"}))
         if root.mu_unit.study.effects:
             wrapped(layout, "With the named effects that the panel Simulate lists", "LIGHT")
         draw_job(layout, root, optimization.OPTIMIZATION, "mu.optimize", "CON_TRACKTO", start_words(root))
@@ -58,22 +58,6 @@ def start_words(root) -> str:
     measured = found is not None and "search" in found.seconds
     seconds = sum(seconds for _, seconds in optimization.plan_of(root))
     return timed("Optimize", (seconds, measured))
-
-
-def _more(layout, props) -> None:
-    """Draw a fold with seldom changed settings."""
-    body = fold(layout, "MU_optimize_more", "More")
-    if not body:
-        return
-    body.prop(props, "robust")
-    body.prop(props, "self_contact")
-    row = body.row()
-    row.prop(props, "has_gravity")
-    if props.has_gravity:
-        row.prop(props, "orientation_deg")
-    column = body.column(align=True)
-    column.prop(props, "refine")
-    column.prop(props, "check_refine")
 
 
 def _head(layout, text: str, what: str):

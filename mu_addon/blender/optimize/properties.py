@@ -18,7 +18,6 @@ from ...optimization.target_kinds import GAP, KINDS, PRESSURE
 from ..shared.blender_property import (
     Choice,
     Flag,
-    FloatVector,
     Number,
     Text,
     blender_property,
@@ -65,13 +64,11 @@ class MU_PG_target(bpy.types.PropertyGroup):
         items=[(name, name.replace("_", " ").title(), sentence(kind.text)) for name, kind in KINDS.items()],
     )
     pressure_kPa: blender_property(PRESSURE, name="At (kPa)", precision=1, step=100)
-    pressures_kPa: FloatVector(
-        "At (kPa)",
-        "Two gauge pressures over which it is taken",
+    pressures_kPa: blender_property(
+        PRESSURE._replace(text="two gauge pressures over which it is taken"),
+        name="At (kPa)",
         size=2,
         default=(-15.0, 30.0),
-        min=PRESSURE.low,
-        max=PRESSURE.high,
         precision=1,
         step=100,
     )

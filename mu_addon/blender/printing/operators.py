@@ -4,7 +4,7 @@ from ...design.settings import UP
 from ...errors import InputError
 from ..jobs.operators import FILES, RUN_FILES, job_operators
 from ..shared import viewports
-from ..shared.blender_property import Flag, FloatVector, Integer
+from ..shared.blender_property import Flag, Integer, blender_property, input_of
 from ..shared.operators import operator, unless
 from ..unit import object as unit_object
 from ..unit.base_classes import UnitOperator, ValidUnitOperator
@@ -129,8 +129,8 @@ def print_show(context, root, finding, place, view):
 @operator(
     UnitOperator,
     "Use Direction",
-    direction=FloatVector(
-        "Up", "Away from the platform, in the unit's frame", subtype="XYZ", default=UP, options={"SKIP_SAVE"}
+    direction=blender_property(
+        input_of("check", "direction"), options={"SKIP_SAVE"}, name="Up", size=3, subtype="XYZ", default=UP
     ),
 )
 def print_up(root, direction):

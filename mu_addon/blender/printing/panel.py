@@ -13,7 +13,7 @@ from ..jobs.panel import job_state
 from ..shared.panels import alert, fold, large_button, plain_row, wrapped
 from ..shared.wording import in_panel, path_symbol
 from ..unit import object as unit_object
-from ..unit.base_classes import DONE, OUTDATED, UnitPanel, folded_place
+from ..unit.base_classes import DONE, OUTDATED, UnitPanel, parameters
 from . import layer, marks
 from . import state as printing
 from .properties import OWN_PRINTER
@@ -280,7 +280,7 @@ class MU_PT_print_files(_OfPrint, bpy.types.Panel):
             row.operator("mu.print_specimens", icon="OUTLINER_OB_LATTICE")
             row.operator("mu.print_open", text="", icon="FILE_FOLDER").what = "specimens"
             _state(body, root, printing.SPECIMENS)
-        folded_place(layout, root, "print", "Print Offsets")
+        parameters(layout, root, "print")
 
 
 class MU_PT_print_file(_OfPrint, bpy.types.Panel):

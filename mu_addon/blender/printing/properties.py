@@ -7,7 +7,8 @@ from bpy.props import IntProperty
 
 from ...design.assets import asset_names
 from ...design.settings import FINE, PRINTER, UP
-from ..shared.blender_property import Choice, Flag, FloatVector, Number, blender_property, path_property
+from ...graph.definition import FILE
+from ..shared.blender_property import Choice, Flag, Number, blender_property, input_of, path_property
 from ..shared.registration import property_of
 from . import layer, marks
 
@@ -26,9 +27,8 @@ FORMATS = (
 class MU_PG_printing(bpy.types.PropertyGroup):
     """Print settings of a unit, and the files to write."""
 
-    printer: Choice(
-        "Printer",
-        "Whose limits the check compares with",
+    printer: blender_property(
+        PRINTER,
         items=[
             *(
                 (name, name.replace("-", " ").title(), "Included in the extension")
@@ -40,18 +40,16 @@ class MU_PG_printing(bpy.types.PropertyGroup):
                 "A TOML file of your own; start from printer.toml in the check's folder",
             ),
         ],
-        default=PRINTER.default,
     )
     printer_file: path_property("Limits", "TOML file of a printer and its resin")
-    limits_file: path_property(
-        "Measured", "limits.csv of the specimens, filled in: limits that were measured on printed parts"
-    )
-    up: FloatVector(
-        "Up",
-        "Build direction in the unit's frame, away from the platform. 0 0 1: inlet down",
+    limits_file: blender_property(input_of("check", "limits"), name="Measured", path=FILE)
+    up: blender_property(
+        input_of("check", "direction"),
+        lambda settings, context: layer.follow(settings.id_data),
+        name="Up",
+        size=3,
         subtype="XYZ",
         default=UP,
-        update=lambda settings, context: layer.follow(settings.id_data),
     )
     formats: Choice(
         "Files",
@@ -83,15 +81,8 @@ class MU_PG_printing(bpy.types.PropertyGroup):
         "Vent the cups that trap resin if the unit is built along Up: STL and 3MF get a hole "
         "through the wall for each cup of the print check; plug-1.stl .. close the holes",
     )
-    stl_file: path_property(
-        "File", "STL file to check, with the printer, the measured limits and Up as above"
-    )
-    repair: Flag(
-        "Repair",
-        "Repair the file before the check, where only one remedy is possible: flipped and "
-        "doubled faces, tiny gaps. part.stl is then the repaired part; faults with more than one remedy "
-        "are refused",
-    )
+    stl_file: blender_property(input_of("check", "stl"), name="File", path=FILE)
+    repair: blender_property(input_of("check", "repair"))
     against_unit: Flag(
         "Compare", "Compare the file with this unit's nominal geometry: size, inlet, volume and tunnels"
     )

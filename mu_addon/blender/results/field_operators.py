@@ -3,12 +3,12 @@
 # Blender reads the annotations themselves: no `from __future__ import annotations` here.
 
 import numpy as np
-from bpy.props import BoolProperty, EnumProperty
 from mathutils import Quaternion, Vector
 
 from ...errors import InputError
 from ...report.motion_files import CONTACT_PRESSURE, MODEL_A, REGIONS, SENSITIVITY
 from ..shared import updates, viewports
+from ..shared.blender_property import Choice, Flag
 from ..shared.operators import operator
 from ..simulate import study_folder as studies
 from ..unit import object as unit_object
@@ -31,15 +31,11 @@ def _field_in_words(context, properties) -> str:
     MotionOperator,
     "Show on the Unit",
     tip=_field_in_words,
-    field=EnumProperty(
-        name="Field",
-        description="Physical quantity to show",
-        items=[(f.name, f.label, f.text) for f in field_colours.FIELDS],
+    field=Choice(
+        "Field", "Physical quantity to show", items=[(f.name, f.label, f.text) for f in field_colours.FIELDS]
     ),
-    frame=BoolProperty(name="Frame in View", description="Bring the unit into view", default=True),
-    jump=BoolProperty(
-        name="Jump to the Largest", description="Go to the frame of the field's largest value", default=True
-    ),
+    frame=Flag("Frame in View", "Bring the unit into view", default=True),
+    jump=Flag("Jump to the Largest", "Go to the frame of the field's largest value", default=True),
 )
 def field_show(operator, context, root, field, frame, jump):
     """Paint this field on the unit, in view, at the frame at which it is largest"""

@@ -3,11 +3,11 @@
 # Blender reads the annotations themselves: no `from __future__ import annotations` here.
 
 import bpy
-from bpy.props import BoolProperty, EnumProperty, StringProperty
 
 from ...errors import InputError
 from ...report.motion_files import FOLDER, MODEL_A
 from ..shared import viewports
+from ..shared.blender_property import Choice, Flag, Text
 from ..shared.operators import operator, unless
 from ..shared.registration import menu
 from ..simulate import study_folder as studies
@@ -28,21 +28,17 @@ class MotionOperator(UnitOperator):
 @operator(
     MotionOperator,
     "Show Motion",
-    name=StringProperty(
-        name="Whose", description="`model_a`, the unit without a sensor, or a path's name", default=MODEL_A
-    ),
-    what=EnumProperty(
-        name="Body",
-        description="What moves",
+    name=Text("Whose", "`model_a`, the unit without a sensor, or a path's name", default=MODEL_A),
+    what=Choice(
+        "Body",
+        "What moves",
         items=[
             (motion_parts.MESH, "Analysis Mesh", "The analysis mesh with its fields"),
             (motion_parts.PRINT, "Printable Solid", "The printable body, moved with the mesh"),
         ],
     ),
-    on=BoolProperty(name="Show", description="Show or hide it", default=True),
-    timeline=BoolProperty(
-        name="Fit Timeline", description="End the scene's timeline where the protocol ends", default=True
-    ),
+    on=Flag("Show", "Show or hide it", default=True),
+    timeline=Flag("Fit Timeline", "End the scene's timeline where the protocol ends", default=True),
 )
 def motion(context, root, name, what, on, timeline):
     """Show or hide the motion without a sensor or with a path, as mesh or as print"""
@@ -88,7 +84,7 @@ def motion_range(root):
 @operator(
     MotionOperator,
     "Legend in Renders",
-    on=BoolProperty(name="Show", description="Show or hide it", default=True),
+    on=Flag("Show", "Show or hide it", default=True),
 )
 def motion_legend(root, on):
     """Add the legend to the scene next to the unit, so that renders show it, or remove it"""
@@ -126,7 +122,7 @@ def draw_colours(self, context) -> None:
     UnitOperator,
     "Enlarge",
     undo=False,
-    name=StringProperty(name="Picture", description="Name of its file in the study's folder"),
+    name=Text("Picture", "Name of its file in the study's folder"),
 )
 def picture(context, root, name):
     """Open a picture of the study in a new image editor"""

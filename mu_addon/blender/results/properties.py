@@ -3,10 +3,10 @@
 # Blender reads the annotations themselves: no `from __future__ import annotations` here.
 
 import bpy
-from bpy.props import BoolProperty, EnumProperty, FloatProperty, StringProperty
 
 from ...errors import MuError
 from ..shared import updates, viewports
+from ..shared.blender_property import Choice, Flag, Number, Text
 from ..shared.registration import property_of
 from ..unit import object as unit_object
 from . import field_colours
@@ -50,68 +50,52 @@ def _on_unit(settings, context):
 class MU_PG_motion(bpy.types.PropertyGroup):
     """Display of the motion in a unit's study."""
 
-    field: EnumProperty(
-        name="Field",
-        description="Physical quantity shown by the colours",
+    field: Choice(
+        "Field",
+        "Physical quantity shown by the colours",
         items=[
             (f.name, f"{f.label} ({f.unit})" if f.unit else f.label, f.text) for f in field_colours.FIELDS
         ],
         update=_again,
     )
-    low: FloatProperty(
-        name="From", description="Value of the first colour, in the field's unit", precision=4, update=_range
+    low: Number("From", "Value of the first colour, in the field's unit", precision=4, update=_range)
+    high: Number(
+        "To", "Value of the last colour, in the field's unit", default=1.0, precision=4, update=_range
     )
-    high: FloatProperty(
-        name="To",
-        description="Value of the last colour, in the field's unit",
-        default=1.0,
-        precision=4,
-        update=_range,
-    )
-    lock: BoolProperty(
-        name="Lock Range",
-        description="Keep the range when field, motion or study change, to compare",
-        update=_again,
-    )
-    symmetric: BoolProperty(
-        name="Symmetric", description="Range from -x to x, so that 0 is the middle colour", update=_again
-    )
-    legend: BoolProperty(
-        name="Legend", description="Draw colours, values and unit in the viewport", default=True
-    )
-    cut: BoolProperty(
-        name="Cut Open",
-        description="Show only the half behind the bending plane, to see chambers and walls; if the "
+    lock: Flag("Lock Range", "Keep the range when field, motion or study change, to compare", update=_again)
+    symmetric: Flag("Symmetric", "Range from -x to x, so that 0 is the middle colour", update=_again)
+    legend: Flag("Legend", "Draw colours, values and unit in the viewport", default=True)
+    cut: Flag(
+        "Cut Open",
+        "Show only the half behind the bending plane, to see chambers and walls; if the "
         "analysis mesh is a half",
         default=True,
         update=_surface,
     )
-    on_unit: BoolProperty(
-        name="On the Unit",
-        description="Show the first motion in place of the design instead of next to it",
+    on_unit: Flag(
+        "On the Unit",
+        "Show the first motion in place of the design instead of next to it",
         default=True,
         update=_on_unit,
     )
-    marker: BoolProperty(
-        name="Largest Value",
-        description="Mark in the viewport where the field is largest at this frame",
+    marker: Flag(
+        "Largest Value",
+        "Mark in the viewport where the field is largest at this frame",
         default=True,
         update=lambda settings, context: viewports.redraw(),
     )
-    apart: FloatProperty(
-        name="Apart",
-        description="Distance between neighbours, in widths of the unit; 0 puts all in one place",
+    apart: Number(
+        "Apart",
+        "Distance between neighbours, in widths of the unit; 0 puts all in one place",
         default=1.5,
         min=0.0,
         max=10.0,
         update=lambda settings, context: motion_parts.arrange(settings.id_data),
     )
-    live: BoolProperty(
-        name="Follow the Timeline",
-        description="Write the fields at every frame; without it only shapes move, which is faster",
+    live: Flag(
+        "Follow the Timeline",
+        "Write the fields at every frame; without it only shapes move, which is faster",
         default=True,
         update=_again,
     )
-    trouble: StringProperty(
-        name="Trouble", description="Why the motion could not be updated", options={"HIDDEN"}
-    )
+    trouble: Text("Trouble", "Why the motion could not be updated", options={"HIDDEN"})

@@ -2,11 +2,10 @@
 
 # Blender reads the annotations themselves: no `from __future__ import annotations` here.
 
-from bpy.props import StringProperty
-
 from ...errors import InputError
 from ...studies import unit_runs
 from ..shared import updates
+from ..shared.blender_property import Text
 from ..shared.operators import operator, unless
 from ..simulate import study_folder as studies
 from ..unit import object as unit_object
@@ -22,7 +21,7 @@ class _OfRun(UnitOperator):
     trouble = unless(studies.runs_of, "No run yet: simulate this unit first")
 
 
-_KEY = StringProperty(name="Run", description="Name of the run's folder; empty: the run that is shown")
+_KEY = Text("Run", "Name of the run's folder; empty: the run that is shown")
 
 
 def _run_of(root, key):

@@ -3,12 +3,13 @@
 # Blender reads the annotations themselves: no `from __future__ import annotations` here.
 
 import bpy
-from bpy.props import BoolProperty, CollectionProperty, IntProperty, StringProperty
+from bpy.props import CollectionProperty, StringProperty
 
 from ...errors import MuError
 from ...studies import unit_runs
 from ..jobs.start_child import JOB_ENDED
 from ..shared import viewports
+from ..shared.blender_property import Flag, Integer, Text
 from ..shared.registration import connected, handler, property_of, timer
 from ..simulate import study_folder as studies
 from ..unit import object as unit_object
@@ -61,10 +62,8 @@ class MU_PG_run(bpy.types.PropertyGroup):
     """An entry of the list: a run, by its key."""
 
     key: StringProperty(options={"HIDDEN"})
-    title: StringProperty(
-        name="Name", description="Your name for this run; empty for a description", get=_title, set=_rename
-    )
-    starred: BoolProperty(name="Star", description="Mark this run, to find it again", get=_starred, set=_star)
+    title: Text("Name", "Your name for this run; empty for a description", get=_title, set=_rename)
+    starred: Flag("Star", "Mark this run, to find it again", get=_starred, set=_star)
 
 
 def _index(listed) -> int:
@@ -85,9 +84,9 @@ class MU_PG_runs(bpy.types.PropertyGroup):
     """Runs of the active unit, read from their folders: no file keeps the list, and undo leaves it alone."""
 
     entries: CollectionProperty(type=MU_PG_run, description="Runs, the latest first")
-    index: IntProperty(
-        name="Shown Run",
-        description="The run whose results are shown. A click shows another one, a double click renames it",
+    index: Integer(
+        "Shown Run",
+        "The run whose results are shown. A click shows another one, a double click renames it",
         get=_index,
         set=_choose,
     )

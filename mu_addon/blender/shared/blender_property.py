@@ -21,6 +21,8 @@ from bpy.props import (
 )
 
 from ...design.quantity import Description
+from ...graph.definition import FOLDER
+from ...studies import study
 from .wording import choice_label, label, tooltip
 
 MILLIMETRES = "DISTANCE_CAMERA"
@@ -36,8 +38,29 @@ def exact(value: float) -> float:
     return float(str(np.float32(value)))
 
 
-def blender_property(d: Description, update=None, options=frozenset(), name="", items=(), **more):
-    """The Blender property of one parameter or setting; name, items and more: replace derived values."""
+_DESCRIBED: dict[Any, Description] = {}
+"""What each property was made from."""
+
+
+def described_fields(owner: Any) -> dict[str, Description]:
+    """Descriptions by name of the properties of a group, node or class that were made from one."""
+    every = (owner if isinstance(owner, type) else type(owner)).__annotations__.items()
+    return {name: _DESCRIBED[made] for name, made in every if made in _DESCRIBED}
+
+
+def blender_property(d: Description, update=None, options=frozenset(), name="", **more):
+    """The Blender property of one parameter or setting; name, more: replace derived values.
+
+    path: "file" or "folder" if it names one; size: how many numbers it is, if several, the default's.
+    """
+    made = _made(d, update=update, options=options, name=name, **more)
+    _DESCRIBED[made] = d
+    return made
+
+
+def _made(d: Description, update, options, name, items=(), path="", **more):
+    if path:
+        more["subtype"], options = ("DIR_PATH" if path == FOLDER else "FILE_PATH"), BESIDE_BLEND_FILE
     shared = {
         "name": name or label(d),
         "description": tooltip(d),
@@ -48,22 +71,23 @@ def blender_property(d: Description, update=None, options=frozenset(), name="", 
         text = textwrap.shorten(d.text, 60)
         # A file keeps the number, which is the name's: it stays when a choice is added.
         items = items or [(name, choice_label(name), text, crc32(name.encode()) >> 1) for name in d.choices]
-        return EnumProperty(items=items, default=d.default, **shared)
+        return EnumProperty(items=items, **{"default": d.default, **more}, **shared)
     if d.type is str:
         return StringProperty(default=d.default, **more, **shared)
     if d.type is bool:
-        return BoolProperty(default=d.default, **shared)
+        return BoolProperty(default=d.default, **more, **shared)
     if d.type is int:
         most = min(int(d.high), MOST_INT)
         return IntProperty(default=d.default, min=int(d.low), max=most, **more, **shared)
-    length = {"subtype": MILLIMETRES} if d.unit == "mm" else {}
-    return FloatProperty(
-        default=d.default,
-        min=d.low,
-        max=d.high,
-        **{"precision": 3 if d.high < 1000 else 1, "step": step_of(d.high), **length, **more},
-        **shared,
-    )
+    number = {"default": d.default, "min": d.low, "max": d.high, "step": step_of(d.high)}
+    number |= {"precision": 3 if d.high < 1000 else 1} | ({"subtype": MILLIMETRES} if d.unit == "mm" else {})
+    return (FloatVectorProperty if "size" in more else FloatProperty)(**number | more, **shared)
+
+
+def input_of(name: str, of: str) -> Description:
+    """The description of a study's input that is one value, or several alike."""
+    found: Description = study(name).inputs()[of].descriptions[0]
+    return found
 
 
 def step_of(high_mm: float) -> int:

@@ -4,8 +4,14 @@ from __future__ import annotations
 
 import re
 import textwrap
+from collections.abc import Callable, Collection, Iterable
+from functools import partial
+from typing import Any, NamedTuple
 
+from ...design.quantity import Description
+from .blender_property import described_fields
 from .updates import Signal
+from .wording import heading
 
 CHARACTERS = 34
 """Letters in one line of a panel of usual width: labels do not wrap."""
@@ -79,6 +85,41 @@ def fold(layout, name: str, title: str, wrong: bool = False, icon: str = "NONE",
     header.alert = wrong
     header.label(text=title, icon="ERROR" if wrong else icon)
     return body
+
+
+class Field(NamedTuple):
+    """A setting in a panel: its description, what draws it into a layout, True if its value breaks a rule."""
+
+    description: Description
+    draw: Callable[[Any], object]
+    wrong: bool = False
+
+
+def draw_settings(layout, fields: Iterable[Field]) -> dict[str, Any]:
+    """Draw usual settings, then a fold for each group of advanced ones; return the open folds by title."""
+    groups: dict[str, list[Field]] = {"": []}
+    for one in fields:
+        groups.setdefault(one.description.group, []).append(one)
+    found = {}
+    for title, inside in groups.items():
+        body = layout
+        if title:
+            body = fold(layout, f"MU_{title}", heading(title), any(one.wrong for one in inside))
+        if body:
+            found[title], column = body, body.column(align=True)
+            for one in inside:
+                one.draw(column)
+    return found
+
+
+def fields_of(owner, hidden: Collection[str] = ()) -> list[Field]:
+    """The settings of a property group, in its order, without hidden ones."""
+    shown = {name: d for name, d in described_fields(owner).items() if name not in hidden}
+    return [Field(d, partial(_draw, owner=owner, name=name)) for name, d in shown.items()]
+
+
+def _draw(layout, owner, name: str) -> None:
+    layout.prop(owner, name)
 
 
 def plain_row(layout, align: bool = True):

@@ -77,6 +77,12 @@ def sentence(text: str) -> str:
     return text[:1].upper() + text[1:]
 
 
+def heading(text: str) -> str:
+    """A text as the head of a fold: "caps and inlet" becomes "Caps and Inlet"."""
+    words = (word if word in ("and", "of", "the", "through") else sentence(word) for word in text.split())
+    return sentence(" ".join(words))
+
+
 def path_symbol(name: str) -> str:
     """The name of a sensor path with its Greek letter: "alpha4" becomes "α4"."""
     return name.replace("alpha", "α")

@@ -24,7 +24,7 @@ from ..simulate.job import SIMULATION
 from ..simulate.panel import start_words
 from ..unit import drawing
 from ..unit import object as unit_object
-from ..unit.base_classes import NO_UNIT, UnitPanel, fix_button, folded_place, parameters
+from ..unit.base_classes import NO_UNIT, UnitPanel, fix_button, parameters
 from ..unit.broken import broken
 from . import figures
 
@@ -205,8 +205,8 @@ class MU_PT_lattice(UnitPanel, bpy.types.Panel):
     def show(self, layout, context, root):
         envelope = root.mu_unit.envelope
         parameters(layout, root, "lattice")
-        graded = folded_place(layout, root, "grading", "Grading", GRADED, "MU_grading")
-        if graded:
+        if graded := parameters(layout, root, "grading").get("grading"):
+            wrapped(graded, GRADED, "INFO")
             _painting(graded, root)
         if envelope is not None:
             wrapped(layout, f"The lattice fills {envelope.name}; counts of cells are not used", "INFO")

@@ -7,9 +7,9 @@ import bpy
 from ...design.printing.finding import counted
 from ..jobs import start_child
 from ..jobs.panel import job_state, start_button, timed
-from ..shared.panels import fold, wrapped
+from ..shared.panels import draw_settings, fields_of, wrapped
 from ..unit import resins
-from ..unit.base_classes import DONE, OUTDATED, UnitPanel, folded_place
+from ..unit.base_classes import DONE, OUTDATED, UnitPanel, parameters
 from . import effects
 from . import study_folder as studies
 from .job import SIMULATION, announced
@@ -40,14 +40,10 @@ class MU_PT_simulate(UnitPanel, bpy.types.Panel):
             )
         study = root.mu_unit.study
         layout.prop(study, "command")
-        if study.command == "place":
-            layout.prop(study, "paths")
-            layout.prop(study, "all_paths")
-        layout.prop(study, "refine")
-        layout.prop(study, "self_contact")
-        if study.self_contact:
-            layout.prop(study, "self_friction")
-        layout.prop(study, "protocol")
+        hidden = set() if study.command == "place" else {"paths", "all_paths"}
+        hidden |= set() if study.self_contact else {"self_friction"}
+        hidden |= set() if effects.has_gravity(root) else {"orientation_deg"}
+        draw_settings(layout, fields_of(study, hidden))
         _effects(layout, root)
         child, expected = SIMULATION.child(root), announced(root)
         start_button(layout, child, "mu.simulate", "PLAY", root=root, text=timed("Simulate", expected))
@@ -62,11 +58,8 @@ class MU_PT_simulate(UnitPanel, bpy.types.Panel):
             wrapped(layout, counted(len(others), "other job runs", "other jobs run"), "INFO")
         text = resins.name_of(root)
         layout.operator_menu_enum("mu.resin", "name", text=text, icon="MATERIAL")
-        folded_place(layout, root, "simulate", "Constants of the Resin")
-        body = fold(layout, "MU_computing", "Device and Folder")
-        if body:
-            body.prop(study, "device")
-            body.prop(study, "folder")
+        parameters(layout, root, "simulate")
+        layout.prop(study, "folder")
 
 
 def start_words(root) -> str:
@@ -75,7 +68,7 @@ def start_words(root) -> str:
 
 
 def _effects(layout, root) -> None:
-    """Draw the effects named by a diagnosis, and the direction of gravity if it matters."""
+    """Draw the effects named by a diagnosis."""
     lines = effects.lines(root)
     if not lines:
         return
@@ -85,5 +78,3 @@ def _effects(layout, root) -> None:
     row.operator("mu.evidence_remove", text="", icon="X")
     for line in lines:
         wrapped(box, line)
-    if effects.has_gravity(root):
-        box.prop(root.mu_unit.study, "orientation_deg")

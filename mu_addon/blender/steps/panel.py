@@ -5,10 +5,10 @@ from __future__ import annotations
 import bpy
 
 from ...design.steps import STEPS
-from ..shared.panels import wrapped
+from ..shared.panels import draw_settings, wrapped
 from ..shared.wording import sentence
 from ..unit import stack
-from ..unit.base_classes import UnitPanel, parameter
+from ..unit.base_classes import UnitPanel, unit_field
 from ..unit.drawing import DRAWN
 from ..unit.fields import description
 
@@ -49,8 +49,8 @@ class MU_PT_stack(UnitPanel, bpy.types.Panel):
             wrapped(layout, f"Muted: {step.muting}", "ERROR")
         column = layout.column(align=True)
         column.enabled = not entry.muted
-        for section, name in stack.own_parameters(step):
-            parameter(column, root, section, description(section, name))
+        own = stack.own_parameters(step)
+        draw_settings(column, [unit_field(root, s, description(s, name)) for s, name in own])
         row = layout.row(align=True)
         if step.name == "solid":
             row.operator("mu.solid")

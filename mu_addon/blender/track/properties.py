@@ -6,12 +6,26 @@ from typing import Any
 
 import bpy
 
+from ...design.settings import ORIENTATION
 from ...errors import InputError
+from ...graph.definition import FILE
 from ...measured.bench import Bench, MarkerSettings
-from ...measured.kinds import ROLES
+from ...measured.kinds import BETWEEN, ROLES
 from ...measured.video import View
-from ..shared.blender_property import Choice, Flag, FloatVector, Number, Text, exact, path_property
+from ..shared.blender_property import (
+    Choice,
+    Flag,
+    FloatVector,
+    Number,
+    Text,
+    blender_property,
+    exact,
+    input_of,
+    path_property,
+)
 from ..shared.registration import property_of
+
+SCALES = BETWEEN["scale"]
 
 
 def _track(name: str, description: str):
@@ -75,16 +89,9 @@ class MU_PG_bench(bpy.types.PropertyGroup):
         "Measure relative to the base in each frame, for a camera or clamp that moves; otherwise "
         "relative to its mean position, which gives less noise",
     )
-    fps: Number(
-        "Frame Rate",
-        "Frames per second. 0: the rate stored in the clip; a sequence of pictures has none, and "
-        "a slow-motion film has a wrong one",
-        min=0.0,
-    )
+    fps: blender_property(input_of("track", "frame_rate"))
     starts_s: Number("Starts at (s)", "Time of the pressure's record at the clip's first frame", precision=3)
-    pressure: path_property(
-        "Pressure", "CSV file of time_s,pressure_kPa: a recording, or the protocol that was played"
-    )
+    pressure: blender_property(input_of("track", "pressure"), path=FILE)
     folder: path_property(
         "Measured Data", "Folder that gets the experiment; other clips may be in it already", folder=True
     )
@@ -101,13 +108,10 @@ class MU_PG_bench(bpy.types.PropertyGroup):
             ),
         ],
     )
-    unit_scale: Number("Scale", "Scale of the unit that was filmed", default=1.0, min=0.01)
-    orientation_deg: Number(
-        "Gravity about x (deg)",
-        "Direction of gravity about x: at 0 the unit hangs with the tip down",
-        min=-360.0,
-        max=360.0,
+    unit_scale: Number(
+        "Scale", "Scale of the unit that was filmed", default=1.0, min=SCALES[0], max=SCALES[1]
     )
+    orientation_deg: blender_property(ORIENTATION, name="Gravity about x (deg)")
     specimen: Text("Specimen", "Name of the print, such as A; may be empty")
 
 

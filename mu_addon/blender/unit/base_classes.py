@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Collection
+from functools import partial
+from typing import Any
 
 from ...design.parameters import SECTIONS
 from ...design.quantity import Description, describe
 from ...design.wall_material import Wall, offered
 from ..shared.operators import RootOperator, RootPoll
-from ..shared.panels import RootPanel, fold, wrapped
+from ..shared.panels import Field, RootPanel, draw_settings
 from ..shared.wording import label
 from .broken import broken
 from .fields import description, field, shown_value
@@ -25,19 +27,6 @@ PLACES = {
     "wall": "simulate",
     "print": "print",
 }
-FIRST = {
-    "chambers": ("count", "cell_mm", "bladder_diameter_mm", "neck_diameter_mm", "wall_mm"),
-    "lattice": (
-        "kind",
-        "cells_x",
-        "cells_y_minus",
-        "cells_y_plus",
-        "junction_diameter_mm",
-        "midspan_diameter_mm",
-    ),
-    "waveguide": ("row", "well_pitch_mm"),
-}
-"""Parameters of a section that are always shown; others are folded. Other sections have none."""
 
 
 class UnitPoll(RootPoll):
@@ -129,38 +118,20 @@ def fix_button(layout, root, section: str, name: str, value, why: str, short: bo
     button.section, button.name, button.why = section, name, why
 
 
-def parameters(layout, root, place: str) -> None:
-    """Draw fields of every section that belongs to a place; seldom changed ones are folded below it."""
-    props = root.mu_unit
-    folded = []
+def parameters(layout, root, place: str) -> dict[str, Any]:
+    """Draw fields of every section that belongs to a place, see `draw_settings`; return the open folds."""
+    fields = []
     for section in SECTIONS:
         if PLACES.get(section.section, "design") == place:
-            group = getattr(props, section.section)
-            column = layout.column(align=True)
+            group = getattr(root.mu_unit, section.section)
             shown = offered(group.law, group.friction_share) if section is Wall else None
-            first = FIRST.get(section.section)
-            for d in describe(section):
-                if first is not None and d.name not in first:
-                    folded.append((section.section, d))
-                elif shown is None or d.name in shown:
-                    parameter(column, root, section.section, d)
-    if folded:
-        found = broken(root)
-        wrong = found is not None and any((section, d.name) in found.fits for section, d in folded)
-        if body := fold(layout, f"MU_more_{place}", "More", wrong):
-            column = body.column(align=True)
-            for section, d in folded:
-                parameter(column, root, section, d)
+            every = (d for d in describe(section) if shown is None or d.name in shown)
+            fields += [unit_field(root, section.section, d) for d in every]
+    return draw_settings(layout, fields)
 
 
-def folded_place(layout, root, place: str, title: str, hint: str = "", name: str = ""):
-    """Draw a fold with the fields of every section that belongs to a place; red while one breaks a rule.
-
-    Returns the fold's layout, or None while it is closed. name: by which Blender keeps it open.
-    """
-    body = fold(layout, name or f"MU_fold_{place}", title, _blamed(root, [place]))
-    if body:
-        if hint:
-            wrapped(body, hint, "INFO")
-        parameters(body, root, place)
-    return body
+def unit_field(root, section: str, d: Description) -> Field:
+    """The field of a unit's parameter."""
+    found = broken(root)
+    wrong = found is not None and (section, d.name) in found.fits
+    return Field(d, partial(parameter, root=root, section=section, d=d), wrong)

@@ -16,10 +16,10 @@ from ...design.parameters import SECTIONS, Unit
 from ...design.quantity import Description, describe
 from ...errors import InputError
 from ...fem.device import DEVICE
+from ...graph.definition import FILE
 from ...meshing.settings import REFINE, SELF_CONTACT
 from ...simulate_and_place.settings import ALL_PATHS, ORIENTATION, PATHS, PROTOCOL, SELF_FRICTION
 from ..shared.blender_property import (
-    BESIDE_BLEND_FILE,
     Choice,
     Flag,
     Integer,
@@ -86,7 +86,7 @@ class MU_PG_study(bpy.types.PropertyGroup):
             ("cuda:0", "CUDA", "The first CUDA device, by conjugate gradients"),
         ],
     )
-    protocol: blender_property(PROTOCOL, options=BESIDE_BLEND_FILE, subtype="FILE_PATH")
+    protocol: blender_property(PROTOCOL, path=FILE)
     orientation_deg: blender_property(ORIENTATION, name="Gravity (deg)", precision=1, step=100)
     # model.toml of the effects that a diagnosis named beside the unit's parameters, see `effects`.
     effects: StringProperty(options={"HIDDEN"})

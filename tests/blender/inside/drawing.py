@@ -25,9 +25,37 @@ def drawn(panels):
     layout.operator.side_effect = lambda name, text="", **_: texts.append(text or name) or MagicMock()
     layout.prop.side_effect = lambda data, name, **_: name == "name" and texts.append(data.name)
     layout.template_icon.side_effect = lambda icon, scale: texts.append("a picture")
-    for panel in panels_of(panels) if inspect.ismodule(panels) else panels:
+    draw(panels_of(panels) if inspect.ismodule(panels) else panels, layout)
+    return " ".join(texts)
+
+
+def draw(panels, layout):
+    """Draw those of these panels that show now."""
+    for panel in panels:
         if getattr(panel, "poll", lambda _: True)(bpy.context):
             seat = MagicMock(layout=layout, find_root=getattr(panel, "find_root", None))
             seat.show = lambda *words, panel=panel, seat=seat: panel.show(seat, *words)
             panel.draw(seat, bpy.context)
-    return " ".join(texts)
+
+
+class Folds:
+    """A layout of open folds that keeps each field drawn: its owner, its name, the fold's title."""
+
+    def __init__(self, found, title=""):
+        self.found, self.title = found, title
+
+    def __getattr__(self, name):
+        return lambda *_, **__: MagicMock()
+
+    def row(self, *_, **__):
+        return self
+
+    column = box = split = grid_flow = row
+
+    def panel(self, name, default_closed):
+        head, body = MagicMock(), Folds(self.found)
+        head.label.side_effect = lambda text, icon="": setattr(body, "title", text)
+        return head, body
+
+    def prop(self, owner, name, **_):
+        self.found.append((owner, name, self.title))

@@ -203,12 +203,12 @@ def test_a_closed_fold_with_a_fault_is_red():
 
     layout = MagicMock()
     layout.panel.side_effect = panel
-    for pitch, red in ((4.0, False), (0.5, True)):
-        root.mu_unit.waveguide.well_pitch_mm = pitch
-        base_classes.folded_place(layout, root, "path", "Waveguide")
-        base_classes.folded_place(layout, root, "simulate", "Material")
-        assert heads["MU_fold_path"].alert is red
-        assert heads["MU_fold_simulate"].alert is False
+    for depth, red in ((0.65, False), (5.0, True)):
+        root.mu_unit.waveguide.well_depth_mm = depth
+        base_classes.parameters(layout, root, "path")
+        base_classes.parameters(layout, root, "simulate")
+        assert heads["MU_section and wells"].alert is red
+        assert heads["MU_seats"].alert is heads["MU_constants of the resin"].alert is False
 
 
 def test_the_head_says_what_a_unit_comes_to():
