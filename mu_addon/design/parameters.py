@@ -216,13 +216,8 @@ class Waveguide:
             "inclusion_radius_mm",
         ),
         "seats": (
-            "seats",
-            "part_length_mm",
-            "part_width_mm",
-            "part_height_mm",
-            "seat_clearance_mm",
-            "seat_wall_mm",
-            "cable_mm",
+            *("seats", "part_length_mm", "part_width_mm", "part_height_mm"),
+            *("seat_clearance_mm", "seat_wall_mm", "cable_mm"),
         ),
     }
 
@@ -329,7 +324,7 @@ class Printing:
     """Section [print]: difference of the printed part from the nominal one; in mm, equal at every scale."""
 
     section: ClassVar[str] = "print"
-    advanced: ClassVar[Groups] = {"print offsets and skin": ()}
+    advanced: ClassVar[Groups] = {"print offsets": ()}
 
     offset_xy_mm: float = quantity(
         0.0,
