@@ -88,7 +88,7 @@ class MU_PT_node(_Panel, bpy.types.Panel):
             row = layout.row(align=True)
             for what in state.places(node):
                 row.operator("mu.node_open", text=what.capitalize()).what = what
-        node.draw_buttons_ext(context, layout.column())
+        node.draw_buttons_ext(context, layout)
 
 
 def _entry(layout, text: str, kind: str) -> None:

@@ -95,8 +95,11 @@ class Field(NamedTuple):
     wrong: bool = False
 
 
-def draw_settings(layout, fields: Iterable[Field]) -> dict[str, Any]:
-    """Draw usual settings, then a fold for each group of advanced ones; return the open folds by title."""
+def draw_settings(layout, fields: Iterable[Field], enabled: bool = True) -> dict[str, Any]:
+    """Draw usual settings, then a fold for each group of advanced ones; return the open folds by title.
+
+    layout: as wide as its panel, as Blender's folds need it.
+    """
     groups: dict[str, list[Field]] = {"": []}
     for one in fields:
         groups.setdefault(one.description.group, []).append(one)
@@ -107,6 +110,7 @@ def draw_settings(layout, fields: Iterable[Field]) -> dict[str, Any]:
             body = fold(layout, f"MU_{title}", heading(title), any(one.wrong for one in inside))
         if body:
             found[title], column = body, body.column(align=True)
+            column.enabled = enabled
             for one in inside:
                 one.draw(column)
     return found

@@ -47,10 +47,8 @@ class MU_PT_stack(UnitPanel, bpy.types.Panel):
         wrapped(layout, sentence(step.text), "INFO")
         if entry.muted:
             wrapped(layout, f"Muted: {step.muting}", "ERROR")
-        column = layout.column(align=True)
-        column.enabled = not entry.muted
-        own = stack.own_parameters(step)
-        draw_settings(column, [unit_field(root, s, description(s, name)) for s, name in own])
+        own = [unit_field(root, s, description(s, name)) for s, name in stack.own_parameters(step)]
+        draw_settings(layout, own, not entry.muted)
         row = layout.row(align=True)
         if step.name == "solid":
             row.operator("mu.solid")

@@ -39,20 +39,24 @@ def draw(panels, layout):
 
 
 class Folds:
-    """A layout of open folds that keeps each field drawn: its owner, its name, the fold's title."""
+    """A layout of open folds that keeps each field drawn: its owner, its name, the fold's title.
 
-    def __init__(self, found, title=""):
-        self.found, self.title = found, title
+    wide: it is as wide as its panel, without which Blender draws no fold.
+    """
+
+    def __init__(self, found, title="", wide=True):
+        self.found, self.title, self.wide = found, title, wide
 
     def __getattr__(self, name):
         return lambda *_, **__: MagicMock()
 
     def row(self, *_, **__):
-        return self
+        return Folds(self.found, self.title, wide=False)
 
     column = box = split = grid_flow = row
 
     def panel(self, name, default_closed):
+        assert self.wide, name
         head, body = MagicMock(), Folds(self.found)
         head.label.side_effect = lambda text, icon="": setattr(body, "title", text)
         return head, body
