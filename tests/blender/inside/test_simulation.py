@@ -2,7 +2,6 @@
 
 import importlib.util
 import json
-from unittest.mock import MagicMock
 
 import bpy
 import pytest
@@ -19,7 +18,6 @@ from mu_addon.blender.simulate import panel as simulate_panel
 from mu_addon.blender.simulate import study_folder as studies
 from mu_addon.blender.simulate.job import SIMULATION, job_of
 from mu_addon.blender.unit import object as unit_object
-from mu_addon.blender.unit.base_classes import parameters
 from mu_addon.meshing.settings import MeshSettings
 
 from .acting import add, refused
@@ -65,22 +63,6 @@ def test_without_the_solver_geometry_works_and_the_panel_says_why(monkeypatch, b
     assert "Cannot simulate: warp not found" in drawn()
     assert "Not in this Blender: warp" in refused(bpy.ops.mu.simulate)
     assert bpy.ops.mu.solid() == {"FINISHED"}
-
-
-def test_a_fold_is_red_while_a_rule_is_broken_inside():
-    root = add()
-    layout, header = MagicMock(), MagicMock()
-    layout.panel.return_value = header, None
-    parameters(layout, root, "design")
-    assert not header.alert
-    shown = {call.args[1] for call in layout.column().prop.call_args_list}
-    assert "wall_mm" in shown
-    assert not {"inlet_length_mm", "tip_cap_mm"} & shown, "seldom changed, and so folded"
-    root.mu_unit.chambers.inlet_diameter_mm = 30.0
-    bpy.context.view_layer.update()
-    assert root.mu_unit.trouble
-    parameters(layout, root, "design")
-    assert header.alert
 
 
 def test_errors_speak_of_fields_and_not_of_files_or_options():
