@@ -28,9 +28,9 @@ def responses(unit, experiments, settings, cache, progress, held):
     return every if settings.effects else tuple(attrs.evolve(r, variants={}) for r in every)
 
 
-def judge(folder, gauge_kPa=0.0):
+def judge(folder):
     """Fill data/ and study/evidence/ of a folder, and said.json with the messages of the run."""
-    data = bent_unit(folder / "data", {"clogged_chamber.share_lost": 0.5}, gauge_kPa=gauge_kPa)
+    data = bent_unit(folder / "data", {"clogged_chamber.share_lost": 0.5})
     job = Diagnose(
         data=read_folder(data), unit=load_preset("mu-1.0x"), settings=unit_fem.UnitSettings(whole=None)
     )
@@ -39,7 +39,6 @@ def judge(folder, gauge_kPa=0.0):
         context, messages = ended(job, folder / "study" / "evidence")
     assert context.status == 0, messages[-1]
     (folder / "said.json").write_text(json.dumps(messages, default=str))
-    return folder
 
 
 @pytest.fixture(scope="session")

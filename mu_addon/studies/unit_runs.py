@@ -158,9 +158,7 @@ class Run:
     def ranking(self) -> list[tuple[str, float]]:
         """Pairs (path, J_hat in mm), the best first; empty where no paths were ranked."""
         found = self.summary.get("J_hat_mm") or {}
-        # Runs in a .blend's folder outlive the program that made them: some have a table an inclusion rule.
-        numbers = ((name, j) for name, j in found.items() if isinstance(j, int | float))
-        return sorted(((name, float(j)) for name, j in numbers), key=lambda pair: pair[1])
+        return sorted(((name, float(j)) for name, j in found.items()), key=lambda pair: pair[1])
 
     @property
     def estimated_mm(self) -> dict[str, float]:

@@ -12,7 +12,6 @@ from mu_addon.body.printed_mesh import Sizes, mesh_printed
 from mu_addon.design.body import Body
 from mu_addon.design.parameters import load_preset
 from mu_addon.design.wall_material import Wall
-from mu_addon.errors import InputError
 from mu_addon.fem.bending_angle import TipSection
 from mu_addon.fem.carried_nodes import Carried, following
 from mu_addon.fem.equilibrium import Equilibrium
@@ -138,13 +137,6 @@ def test_what_is_solid_again_takes_its_joint_with_it(mesh):
     gone = np.setdiff1d(mesh.beams[:, 0::2], ends)
     assert not np.isin(found.carriers[:, 0::2], gone).any()
     assert len(found.nodes) == len(mesh.nodes)
-
-
-def test_a_law_that_beams_do_not_take_is_refused(mesh):
-    slow = attrs.evolve(SMALL, wall=Wall(law="prony", prony_g1=0.3, prony_tau1_s=1.0))
-    with pytest.raises(InputError, match="no memory") as told:
-        Model(mesh).parameters(materials_of(slow, mesh))
-    assert "solid" in told.value.remedy
 
 
 def test_a_stretched_strut_has_no_stress_across_it(mesh):

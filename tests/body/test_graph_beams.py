@@ -7,7 +7,6 @@ import attrs
 import numpy as np
 import pytest
 from scipy.spatial import cKDTree
-from scipy.spatial.transform import Rotation
 
 from mu_addon.body.beams import Layers, integrals
 from mu_addon.body.frame import frame_tensor, frame_zones
@@ -21,7 +20,7 @@ from mu_addon.design.grading import Grading
 from mu_addon.design.lattice import filled, lattice_of
 from mu_addon.design.parameters import load_preset
 from mu_addon.fem.bending_angle import bending_angle_deg
-from mu_addon.fem.carried_nodes import Carried, following
+from mu_addon.fem.carried_nodes import Carried
 from mu_addon.fem.elements import reference_gradients, shape_functions, tet_quadrature
 from mu_addon.fem.equilibrium import Equilibrium
 from mu_addon.fem.materials import Materials
@@ -214,17 +213,6 @@ def test_candidates_share_the_layers_of_their_mesh(unit, meshes, sensed):
     path = np.array([[0.0, 25.0, 12.5 * (k + 0.5)] for k in range(3)])
     anew = with_waveguide(attrs.evolve(mesh), bar_of(unit, path), unit)
     assert anew.hash() == sensed["half"].hash()
-
-
-def test_a_rigid_motion_strains_no_beam_and_carries_its_nodes(meshes):
-    mesh = meshes("half")
-    turn = Rotation.from_rotvec([0.3, -0.2, 0.5])
-    u = np.array([1.0, 2.0, 3.0]) + turn.apply(mesh.nodes) - mesh.nodes
-    wanted = u.copy()
-    u[mesh.beams[:, 1::2]] = turn.as_rotvec()
-    u[mesh.carried] = 0.0
-    found = following(mesh, u)
-    np.testing.assert_allclose(found[mesh.carried], wanted[mesh.carried], atol=1e-12)
 
 
 def test_stretch_within_a_beam_is_that_of_the_motion_between_its_sections(meshes):

@@ -76,14 +76,9 @@ def test_a_body_of_solid_struts_has_none():
     )
 
 
-@pytest.fixture(scope="module")
-def cross():
-    return UNIT.evolve(**kinds.custom(kinds.cross()), seats=False)
-
-
-def test_factors_of_another_kind_are_by_the_joints_place(cross, tmp_path):
+def test_factors_of_another_kind_are_by_the_joints_place(tmp_path):
     """Six struts meet in a cell's centre; in its faces two, end to end, which is hardly a joint."""
-    found = joint_factors(cross.printed, tmp_path)
+    found = joint_factors(UNIT.evolve(**kinds.custom(kinds.cross()), seats=False).printed, tmp_path)
     assert len(found.places) == 4
     centre = (found.places > 0).all(axis=1)
     assert 1.2 < found.stretched[centre].item() < 1.4

@@ -112,26 +112,6 @@ def test_all_of_a_strut_touches_but_its_feet(mesh):
     assert 0.8 < left / np.count_nonzero(bare) <= 1.0
 
 
-def test_no_node_is_tied_to_a_tied_one(mesh):
-    assert not np.isin(mesh.tied_to, mesh.tied).any()
-
-
-def test_forces_are_the_energy_s_slope_and_the_tangent_the_forces_slope(mesh):
-    model = Model(mesh)
-    m = model.parameters(materials_of(SMALL, mesh))
-    rng = np.random.default_rng(4)
-    u = model.moved(np.zeros_like(mesh.nodes), 1e-3 * rng.normal(size=len(model.free)))
-    step = rng.normal(size=len(model.free))
-    h = 1e-6
-    ahead, behind = (model.moved(u, sign * h * step) for sign in (1, -1))
-    slope = (model.potential(ahead, -0.01, m) - model.potential(behind, -0.01, m)) / (2 * h)
-    force = model.residual(u, -0.01, m).ravel()[model.free]
-    assert slope == pytest.approx(force @ step, rel=1e-6)
-    change = model.residual(ahead, -0.01, m) - model.residual(behind, -0.01, m)
-    stiffness = model.matrix(model.tangent(u, -0.01, m)) @ step
-    assert np.abs(change.ravel()[model.free] / (2 * h) - stiffness).max() < 1e-5 * np.abs(stiffness).max()
-
-
 def test_weight_is_that_of_the_resin_and_lost_to_no_tie(mesh):
     model = Model(mesh)
     model.load = gravity(mesh, 1.1e-9, [0.0, 0.0, -1.0])

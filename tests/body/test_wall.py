@@ -13,7 +13,7 @@ from mu_addon.body.printed_mesh import Sizes, wall_mesh
 from mu_addon.design.parameters import Printing, Unit, load_preset
 from mu_addon.design.profile import cavity_radius, cavity_volume, membrane_volume, outer_radius
 from mu_addon.errors import InputError, MeshingError
-from mu_addon.meshing import MeshSettings, mirror
+from mu_addon.meshing import mirror
 from mu_addon.meshing.gmsh_model import GmshUnavailable, load_gmsh
 from mu_addon.meshing.mesh import FLIPPED_TET, TET_EDGES, TRIANGLE_EDGES, boundary_faces, edges_of
 from mu_addon.meshing.quality import cavity_enclosed, check_positive, element_volumes
@@ -122,12 +122,6 @@ def test_mirrored_mesh_is_exactly_symmetric(half):
 def test_a_mirror_must_exist(half):
     with pytest.raises(MeshingError, match="no mirror plane y"):
         mirror(half, "y")
-
-
-@pytest.mark.parametrize(("field", "value"), [("fraction", "quarter"), ("refine", 0.0)])
-def test_settings_are_refused_in_words(field, value):
-    with pytest.raises(InputError, match=field):
-        MeshSettings(**{field: value})
 
 
 def test_inverted_elements_are_counted_and_placed(half):

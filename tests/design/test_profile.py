@@ -1,6 +1,5 @@
 import itertools
 
-import attrs
 import numpy as np
 import pytest
 from hypothesis import given, settings
@@ -168,20 +167,6 @@ def test_volumes_match_an_independent_quadrature(name):
     outer = d.count * quad(lambda z: np.pi * parabolas(d, z) ** 2, 0, d.cell, points=[d.b, d.cell - d.b])[0]
     assert profile.outer_volume(d) == pytest.approx(outer, rel=1e-10)
     assert profile.membrane_volume(d) == pytest.approx(outer - cavity, rel=1e-9)
-
-
-def test_volumes_scale_with_the_cube():
-    one, large = load_preset("mu-1.0x").dimensions, load_preset("mu-1.5x").dimensions
-    for volume in (profile.cavity_volume, profile.membrane_volume):
-        assert volume(large) == pytest.approx(1.5**3 * volume(one), rel=1e-12)
-
-
-def test_a_thin_wall_weighs_area_times_wall():
-    d = attrs.evolve(Unit().dimensions, wall=1e-5, base_cap=1e-9, tip_cap=1e-9)
-    z = np.linspace(0, d.height, 200001)
-    middle = (z[:-1] + z[1:]) / 2
-    ring = 2 * np.pi * profile.outer_radius(d, middle) * np.sqrt(1 + profile.outer_slope(d, middle) ** 2)
-    assert profile.membrane_volume(d) == pytest.approx(1e-5 * np.sum(ring * np.diff(z)), rel=1e-4)
 
 
 @given(units(), st.integers(1, 12))

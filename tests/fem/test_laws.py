@@ -281,15 +281,6 @@ def test_diagonal_stretch_and_cubic_shear_are_springs_along_the_diagonals():
     assert evaluate(DiagonalStretch, kept, [0.5])[0][0] < 1e-30
 
 
-def test_a_foam_in_parallel_with_cubic_shear_has_their_shear_moduli_added():
-    foam = Foam.parameters(0.018, 0.45, 3.0, 9.0)[0]
-    C = sum(evaluate(law, np.eye(3), row)[2][0] for law, row in ((Foam, foam), (CubicShear, [0.05])))
-    C = C.reshape(3, 3, 3, 3)
-    mu, lame = foam[0], foam[4]
-    assert C[0, 1, 0, 1] == pytest.approx(mu + 0.05)
-    assert (C[0, 0, 0, 0], C[0, 0, 1, 1]) == pytest.approx((lame + 2 * mu, lame))
-
-
 @pytest.mark.parametrize(
     ("law", "column", "value", "message"),
     [

@@ -115,18 +115,6 @@ def test_a_full_disk_is_told_and_leaves_no_half_file(tmp_path):
     assert json.loads((out / "summary.json").read_text())["status"] == "partial"
 
 
-def test_a_folder_in_the_way_of_a_file(tmp_path):
-    (tmp_path / "file").write_text("mine")
-    done = here("design", "--preset", "mu-1.0x", "--out", tmp_path / "file")
-    assert_clear_failure(done, 5, "what to do")
-    assert (tmp_path / "file").read_text() == "mine"
-
-
-def test_json_messages_of_a_refused_run_end_with_the_error(tmp_path):
-    bad = here("design", "--preset", "nothing", "--out", tmp_path / "out", "--json")
-    assert json.loads(bad.stdout.splitlines()[-1])["type"] == "error"
-
-
 def test_a_folder_with_somebody_elses_files_is_left_alone(tmp_path):
     (tmp_path / "unit.stl").write_text("mine")
     assert_clear_failure(

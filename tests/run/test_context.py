@@ -198,21 +198,6 @@ def test_handlers_are_put_back():
     assert (signal.getsignal(signal.SIGINT), signal.getsignal(signal.SIGTERM)) == before
 
 
-def test_a_full_disk_still_ends_with_its_message(tmp_path, monkeypatch):
-    messages = []
-    with run_to_end(Progress([messages.append])) as context:
-        context.open_folder(tmp_path)
-
-        def full(_):
-            raise OSError(28, "No space left on device")
-
-        monkeypatch.setattr(os, "fsync", full)
-        write_text(tmp_path / "a.csv", "x")
-    assert context.status == 5
-    assert messages[-1]["type"] == "error"
-    assert "free some space" in messages[-1]["what_to_do"]
-
-
 def full_below(monkeypatch, folder, reserved):
     """Writing as on a disk on which files of `folder` that are there have taken all room but a few bytes."""
     room = sum(path.stat().st_size for path in folder.iterdir()) + reserved

@@ -218,16 +218,6 @@ def test_a_line_longer_than_any_sensor_s_is_refused_unread() -> None:
     assert (decoder.counters.malformed, decoder.counters.samples) == (1, 59)
 
 
-@given(st.lists(st.binary(max_size=400), max_size=20))
-@settings(max_examples=60)
-def test_no_bytes_crash_it(chunks: list[bytes]) -> None:
-    decoder = Decoder()
-    for k, chunk in enumerate(chunks):
-        decoder.feed(chunk, 0.01 * k)
-    decoder.interrupted()
-    decoder.finish(1.0)
-
-
 def test_host_time_follows_the_least_delayed() -> None:
     generator = np.random.default_rng(4)
     decoder = Decoder()

@@ -34,6 +34,7 @@ from mu_addon.simulate_and_place.named_effects import STATIC, NamedEffects
 from mu_addon.studies.parameter_study.plan import parse_plan
 from mu_addon.studies.unit_ranking import UnitStudy
 from tests.evidence import analytic
+from tests.evidence.hollow_finger import finger
 
 from . import unit_runs
 from .made_up import bent
@@ -158,7 +159,8 @@ def test_a_layered_wall_that_stiffens_does_so_in_what_of_it_is_isotropic(mesh):
     )
 
 
-def test_beside_obstacles_weight_acts_from_the_first_instant_on(mesh):
+def test_beside_obstacles_weight_acts_from_the_first_instant_on():
+    mesh = finger(SHORT, ROUGH)
     block = shapes.box((-40, 300, 15), (40, 320, 50)).to_mesh64()
     far = body_of(np.array(block.vert_properties)[:, :3], np.asarray(block.tri_verts).astype(int), "far.stl")
     job = with_effects(90.0, gravity=1300.0)

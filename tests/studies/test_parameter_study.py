@@ -72,17 +72,17 @@ def by_formula(monkeypatch):
     monkeypatch.setattr(point_module, "run_point", formula)
 
 
-def swept(text, folder, add=0, **options):
+def swept(text, folder, add=0, report=False, **options):
     asked.clear()
     plan = parse_plan(text, folder).continued(folder / "sweep.toml", add)
-    context, messages = ended(Sweep(plan=plan, workers=1, **options), folder)
+    context, messages = ended(Sweep(plan=plan, workers=1, **options), folder, report)
     assert context.status == 0, messages[-1]
     return list(csv.DictReader((folder / "points.csv").open(newline=""))), messages
 
 
 def test_every_point_is_a_row_whatever_became_of_it(tmp_path, by_formula):
     text = TEXT.replace("{ low = 0.8, high = 1.2 }", "{ values = [0.9, 1.0, 1.15, 2.5] }")
-    rows, messages = swept(text.replace('"latin_hypercube"', '"grid"'), tmp_path)
+    rows, messages = swept(text.replace('"latin_hypercube"', '"grid"'), tmp_path, report=True)
     (plan,) = (m for m in messages if m["type"] == "plan")
     assert {m["stage"] for m in messages if m["type"] == "progress"} <= {name for name, _ in plan["stages"]}
     assert [row["status"] for row in rows] == ["done", "done", "failed", "failed"]

@@ -68,11 +68,6 @@ def test_a_longer_sobol_sequence_begins_as_the_shorter(count, added, dimensions)
     np.testing.assert_array_equal(whole[:count], first)
 
 
-def test_two_to_the_m_sobol_points_are_balanced():
-    points = sample("sobol", 64, 3, 1)
-    assert occupied(points, 64) == [64] * 3
-
-
 def test_every_input_has_its_name():
     known = variable_names()
     for name in (

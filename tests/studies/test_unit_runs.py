@@ -98,11 +98,6 @@ def test_how_a_run_ended_in_words(tmp_path, summary, words):
     assert ran(tmp_path, FULL, summary, 100).state == words
 
 
-def test_a_ranking_by_inclusion_rules_is_read_as_none(tmp_path):
-    by_rule = {"chosen": {"printed": "alpha4"}, "J_hat_mm": {"printed": {"alpha4": 0.05}}}
-    assert ran(tmp_path, FULL, {"status": "complete", **by_rule}, 100).ranking == []
-
-
 def test_a_run_that_goes_on_says_so(tmp_path):
     run = ran(tmp_path, FULL, {"status": "running"}, 100)
     lock = FolderLock(run.folder)

@@ -33,6 +33,7 @@ from mu_addon.report.motion_files import read_motion
 from mu_addon.simulate_and_place.motion_tables import MOTION_COLUMNS
 from mu_addon.studies.unit_ranking import UnitStudy
 
+from ..evidence.hollow_finger import finger
 from . import unit_runs
 
 ROOT = Path(__file__).parents[2]
@@ -51,13 +52,14 @@ def job_of(unit, time, pressure, **more):
 
 
 @pytest.fixture
-def solid_struts(monkeypatch):
-    """Every wall is simulated with the struts that one with memory has: beams have none."""
+def hollow(monkeypatch):
+    """A hollow finger in a unit's place: beams have no memory, and a solid lattice takes a minute."""
 
-    def solid(*given, **more):
-        return mesh_printed(*given, **{**more, "solid": True})
+    def filled(*given, **_):
+        mesh = finger(*given)
+        return attrs.evolve(mesh, filled=np.ones((len(mesh.tets), 4)))
 
-    monkeypatch.setattr("mu_addon.body.mesh_printed", solid)
+    monkeypatch.setattr("mu_addon.body.mesh_printed", filled)
 
 
 def simulated(folder, job):
@@ -128,7 +130,7 @@ def test_a_file_keeps_the_law_and_no_parameter_of_another(tmp_path):
 
 
 @pytest.mark.slow
-def test_a_wall_that_relaxes_is_stiff_at_once(tmp_path, solid_struts):
+def test_a_wall_that_relaxes_is_stiff_at_once(tmp_path, hollow):
     """At once the shear modulus is 1/(1 - g) times that after long; the bulk modulus does not relax."""
     g, tau, p = 0.4, 1.0, 1.0
     # Compressible enough that no part of the bulk modulus acts on elements' mean volumes: how much of it
@@ -153,7 +155,7 @@ def test_a_wall_that_relaxes_is_stiff_at_once(tmp_path, solid_struts):
 
 
 @pytest.mark.slow
-def test_a_wall_that_softens_does_not_on_its_first_loading_and_a_stopped_run_goes_on(tmp_path, solid_struts):
+def test_a_wall_that_softens_does_not_on_its_first_loading_and_a_stopped_run_goes_on(tmp_path, hollow):
     time, pressure = [0, 1, 2, 3], [0, 1, 2, 1]
     soft, study = simulated(
         tmp_path / "soft",
@@ -171,9 +173,9 @@ def test_a_wall_that_softens_does_not_on_its_first_loading_and_a_stopped_run_goe
     max(study.results.cache.folder.glob("instant*"), key=lambda file: file.stat().st_mtime).unlink()
     again, _ = simulated(tmp_path / "soft", UnitStudy.read(tmp_path / "soft"))
     np.testing.assert_array_equal(again, soft)
-    fields = read_motion(tmp_path / "soft").fields["membrane"]["von_mises_kPa"]
-    # The stress that bears one pressure is about the same; unsoftened, the larger strain would have more.
-    assert np.median(fields[3]) == pytest.approx(np.median(fields[1]), rel=0.01)
+    stress = np.median(read_motion(tmp_path / "soft").fields["membrane"]["von_mises_kPa"], axis=1)
+    # Bent as far on its way up, the wall had more.
+    assert stress[3] < 0.95 * np.interp(soft[3], soft[1:3], stress[1:3])
 
 
 def test_jobs_that_know_no_such_wall_refuse_it():
