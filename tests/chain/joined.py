@@ -11,7 +11,6 @@ import numpy as np
 from mu_addon.chain.chain import GRAVITY_N_PER_G, Loads
 from mu_addon.chain.rigid_motion import motion
 from mu_addon.chain.unit_between_plates import frame, tip_nodes
-from mu_addon.errors import InputError
 from mu_addon.fem.dead_loads import gravity
 from mu_addon.fem.embedding import embed
 from mu_addon.fem.equilibrium import Equilibrium
@@ -85,10 +84,9 @@ def full_model(
 
     turns_deg: of each about the axis. plate_between: whether the planes between units are on rigid plates,
     too, as joints have them; otherwise the nodes of a base are tied to the elements of the tip below, as
-    printed in one piece. Raises InputError for a load that is not dead: a couple.
+    printed in one piece. Loads are dead: no couple.
     """
-    if np.any(loads.tip_couple_N_mm):
-        raise InputError("a full model takes no couple at its tip", "tip couple", "give a force or a mass")
+    assert not np.any(loads.tip_couple_N_mm), "a couple is no dead load"
     nodes: list[Array] = []
     tets: list[Array] = []
     ties: list[tuple[Array, Array, Array]] = []
@@ -127,10 +125,8 @@ def full_model(
     base: Array | None = None
     below: tuple[Mesh, int, Array, float] | None = None
     for unit, mesh, turn in zip(units, meshes, turns_deg, strict=True):
-        if len(mesh.tied) or mesh.symmetry:
-            raise InputError(
-                "a full model is made of whole meshes without ties", "mesh", 'give fraction "full"'
-            )
+        assert not mesh.symmetry
+        assert not len(mesh.tied)
         turned = frame(turn)[:3, :3]
         x = mesh.nodes @ turned.T + [0.0, 0.0, height]
         start = first

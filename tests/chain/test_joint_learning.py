@@ -151,12 +151,6 @@ def test_a_path_that_goes_on_from_the_cache_ends_at_the_same_digits(unit, mesh):
     np.testing.assert_array_equal(rest[12.0][0], whole[12.0][0])
 
 
-def test_a_full_model_takes_no_couple_and_no_half(unit, mesh):
-    loads = Loads(tip_couple_N_mm=np.array([1.0, 0.0, 0.0]))
-    with pytest.raises(InputError, match="takes no couple"):
-        full_model([unit, unit], [mesh, mesh], [0.0, 0.0], loads, DENSITY)
-
-
 def test_a_sampling_out_of_bounds_is_refused():
     with pytest.raises(InputError, match="bend_deg = 90"):
         Sampling(bend_deg=90.0)

@@ -1,4 +1,4 @@
-"""Closed surfaces as obstacles: distances of a box, a ball and a notch, the patch test, Hertz's contact."""
+"""Closed surfaces as obstacles: distances of a box, a ball and a notch, and the patch test."""
 
 import numpy as np
 import pytest
@@ -15,7 +15,6 @@ from mu_addon.fem.rigid_surface import Surface, _closest
 from mu_addon.fem.state import rest
 
 from .bodies import _grid, make
-from .test_obstacle import approached, half_space, hertz
 
 BOX = Box((1.2, 0.5, 1.1), (0.5, 0.2, 0.4))
 CUBE = np.array([[x, y, z] for x in (-1, 1) for y in (-1, 1) for z in (-1, 1)], float)
@@ -182,34 +181,3 @@ def test_patch_across_faces_that_do_not_match(order):
     assert top == pytest.approx(1 - by + slab.deepest_mm(state.u), rel=1e-9)
     for stretch, modulus in ((2 * middle, 1.0), (2 * (top - middle), 3.0)):
         assert confined_stress(stretch, modulus) == pytest.approx(-on.mean(), rel=1e-6)
-
-
-def cap(radius, wide, side):
-    """The lowest part of a ball that touches z = 0, its facets `side` wide within `wide` of the axis."""
-    n = 2 * round(wide / side)
-    t = np.linspace(-wide, wide, n + 1)
-    flat = np.stack(np.meshgrid(t, t, indexing="ij"), axis=-1).reshape(-1, 2)
-    low = np.column_stack([flat, radius - np.sqrt(radius**2 - (flat**2).sum(axis=1))])
-    high = np.column_stack([flat, np.full(len(flat), 2.0)])
-    i = (np.arange(n)[:, None] * (n + 1) + np.arange(n)).ravel()
-    faces = np.vstack([np.stack([i, i + 1, i + n + 2], axis=1), np.stack([i, i + n + 2, i + n + 1], axis=1)])
-    # The rim's edges, once in the direction that the faces have them.
-    edges = faces[:, [[0, 1], [1, 2], [2, 0]]].reshape(-1, 2)
-    known = {tuple(e) for e in edges.tolist()}
-    rim = np.array([e for e in edges.tolist() if (e[1], e[0]) not in known])
-    a, b = rim.T
-    m = len(flat)
-    walls = np.vstack([np.stack([b, a, a + m], axis=1), np.stack([b, a + m, b + m], axis=1)])
-    return Surface(np.vstack([low, high]), np.vstack([faces, walls, faces[:, ::-1] + m]))
-
-
-@pytest.mark.nightly("tests/fem/test_obstacle.py::test_hertz_ball_on_a_half_space")
-def test_hertz_by_a_ball_of_triangles():
-    """Facets a tenth of the contact's radius wide press as the ball itself does."""
-    radius, approach = 10.0, 0.1
-    mesh = half_space(30.0, 8)
-    faceted = approached(mesh, cap(radius, 3.0, 0.1), radius, approach)
-    np.testing.assert_allclose(
-        faceted, approached(mesh, Sphere((0, 0, radius), radius), radius, approach), rtol=0.02
-    )
-    assert faceted[0] == pytest.approx(hertz(radius, approach)[0], rel=0.05)

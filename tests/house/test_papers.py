@@ -9,6 +9,7 @@ from pathlib import Path
 
 import pytest
 
+from mu_addon import __version__
 from mu_addon.cli.main import parser
 
 ROOT = Path(__file__).resolve().parents[2]
@@ -23,7 +24,7 @@ def test_one_version():
     changelog = (ROOT / "CHANGELOG.md").read_text(encoding="utf-8")
     latest = re.search(r"^## \[(\d+\.\d+\.\d+)\]", changelog, re.MULTILINE)
     assert latest is not None
-    assert PROJECT["project"]["version"] == MANIFEST["version"] == latest[1]
+    assert PROJECT["project"]["version"] == MANIFEST["version"] == __version__ == latest[1]
     assert f"\nversion: {latest[1]}\n" in (ROOT / "CITATION.cff").read_text(encoding="utf-8")
 
 

@@ -7,7 +7,7 @@ import pytest
 
 from mu_addon.design.parameters import Unit
 from mu_addon.optimization.freedoms import Freedom, changed_unit
-from mu_addon.optimization.search import Observed, SearchSettings, pareto
+from mu_addon.optimization.search import Observed, SearchSettings
 from mu_addon.optimization.targets import Target
 from mu_addon.optimization.uncertainty import Uncertainty
 
@@ -137,11 +137,6 @@ def test_without_a_sound_design_the_search_ends_with_its_budget():
     found = search_units(TWO, [target("t", low=1.0)], observe, (1.0, 1.0), SearchSettings(5))
     assert not found.feasible
     assert len(found.observed) == 5
-
-
-def test_pareto_keeps_equal_points_and_drops_dominated_ones():
-    costs = np.array([[0.0, 1.0], [1.0, 0.0], [1.0, 1.0], [0.0, 1.0]])
-    assert pareto(costs).tolist() == [0, 1, 3]
 
 
 def test_a_margin_keeps_a_design_that_far_inside_its_bounds():
