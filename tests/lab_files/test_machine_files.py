@@ -612,7 +612,9 @@ def test_a_date_that_a_spreadsheet_wrote_as_a_number_is_no_second(tmp_path, titl
     assert any("of a calendar" in words for words in p.concluded)
 
 
-@pytest.mark.parametrize(("name", "begin"), [("Extension", 753.0), ("Extension", -753.0), ("Strain", 5.0)])
+@pytest.mark.parametrize(
+    ("name", "begin"), [("Extension", 753.0), ("Extension", -753.0), ("Extension", 1.0), ("Strain", 5.0)]
+)
 @pytest.mark.parametrize("way", [1.0, -1.0])
 def test_the_change_of_a_place_tells_its_sign(tmp_path, name, begin, way):
     readings = (f"{0.1 * i:.1f},{0.5 * i:.2f},{begin + way * 0.1 * i:.2f}" for i in range(100))

@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from scipy.special import stdtrit
 
 from mu_addon.errors import InputError
 from mu_addon.fem.laws import Ogden
@@ -50,6 +51,16 @@ def test_three_ogden_terms_follow_treloars_rubber_in_all_modes(to_all_modes, tre
     assert sum(e.share**2 for e in best.errors) < sum(e.share**2 for e in published)
     mu = Ogden.small_strain(best.parameters[None])[0, 0]
     assert mu == pytest.approx(Ogden.small_strain(OGDEN_1972[None])[0, 0], rel=0.12)
+
+
+def test_the_interval_of_one_modulus_is_that_of_a_regression_line_through_rest():
+    stretch = np.linspace(1.05, 1.5, 8)
+    x, noise = stretch - stretch**-2, 0.01 * np.array([1, -1, 1, -1, 1, -1, 1, -1])
+    found = fit_coupons(FORMS["neo-hooke"], [Coupon("line", "uniaxial", stretch, 0.4 * x + noise)])
+    mu = x @ (0.4 * x + noise) / (x @ x)
+    half = stdtrit(7, 0.975) * np.sqrt(np.sum((0.4 * x + noise - mu * x) ** 2) / 7 / (x @ x))
+    (one,) = found.intervals
+    assert (one.value, one.low95, one.high95) == pytest.approx((mu, mu - half, mu + half), rel=1e-4)
 
 
 def test_aicc_counts_the_variance_of_the_noise_as_a_parameter(treloar):

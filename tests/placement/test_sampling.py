@@ -67,3 +67,10 @@ def test_the_estimate_bounds_how_far_two_mean_deviations_lie_apart():
     assert relative_error(fuller, fuller, weight) == 0
     assert relative_error(np.zeros_like(fuller), np.zeros_like(fuller), weight) == 0
     assert relative_error(fuller, 0.9 * fuller, weight) == pytest.approx(0.1)
+
+
+def test_the_error_between_pressures_counts_each_by_its_instants():
+    """Off by 0.4 of 1 mm at the pressure of three of four instants."""
+    fuller, sparser = np.zeros((2, 1, 1, 3)), np.zeros((2, 1, 1, 3))
+    fuller[..., 0], sparser[:, 0, 0, 0] = 1.0, (1.0, 0.6)
+    assert relative_error(fuller, sparser, np.array([1.0, 3.0])) == pytest.approx(0.3)
