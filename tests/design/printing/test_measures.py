@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+import trimesh
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
@@ -11,7 +12,7 @@ from mu_addon.design.printing.check import check
 from mu_addon.design.printing.crossing import MOST_CROSSINGS, crossings, near_pairs
 from mu_addon.design.printing.drainage import necks
 from mu_addon.design.printing.finding import clustered
-from mu_addon.design.printing.orientation import Build, directions, fits, ranked, tilted
+from mu_addon.design.printing.orientation import Build, build, directions, fits, ranked, tilted
 from mu_addon.design.printing.printer import load_printer
 from mu_addon.design.printing.thickness import cast_rays, samples
 from mu_addon.design.printing.voxels import frame_along, voxel_rows
@@ -400,3 +401,17 @@ def test_a_part_may_be_turned_about_the_vertical_to_fit():
     assert fits(np.array([120.0, 190.0, 50.0]), room)
     assert not fits(np.array([130.0, 190.0, 50.0]), room)
     assert not fits(np.array([10.0, 10.0, 211.0]), room)
+
+
+@pytest.mark.parametrize(("slope_deg", "needs"), [(20.0, 0.0), (40.0, 1.0)])
+def test_what_is_flatter_than_the_slope_needs_support(slope_deg, needs):
+    """A roof upside down, of sides that rise by 30 degrees from level over 4 by 10 mm each."""
+    rise = 4.0 * np.tan(np.radians(30.0))
+    ends = [[-4.0, rise], [0.0, 0.0], [4.0, rise], [4.0, rise + 1.0], [-4.0, rise + 1.0]]
+    roof = trimesh.convex.convex_hull(np.array([[x, y, z] for y in (0.0, 10.0) for x, z in ends]))
+    surface = samples(roof.vertices, roof.faces, 0.5)
+    none = np.zeros(len(surface.area), bool)
+    up = np.array([0.0, 0.0, 1.0])
+    found = build(roof.vertices, roof.faces, surface, none, up, 0.1, slope_deg, (50.0, 50.0, 50.0))
+    assert found.support_mm2 == pytest.approx(needs * 80.0 / np.cos(np.radians(30.0)), rel=0.05)
+    assert (found.inner_mm2, found.height_mm, found.fits) == (0.0, pytest.approx(rise + 1.0), True)
