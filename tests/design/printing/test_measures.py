@@ -181,6 +181,21 @@ def test_a_shelf_overhangs_and_a_bridge_spans():
     assert 2.0 * over.reach[worst] == pytest.approx(4.0 - 0.2 / np.tan(np.radians(19)), abs=0.3)
 
 
+@pytest.mark.parametrize(("half_deg", "bridge"), [(25.0, True), (40.0, False)])
+def test_a_roof_over_a_wedge_is_a_bridge_where_its_sides_face_each_other(half_deg, bridge):
+    """By more than 120 degrees: the ways to both sides are apart by 180 less the wedge's angle."""
+    from manifold3d import CrossSection
+
+    half = 11.0 * np.tan(np.radians(half_deg))
+    pit = CrossSection([np.array([[-4.0, 0.0], [7.0, -half], [7.0, half]])]).extrude(6.0)
+    body = box(12, 24, 5).translate([0, 0, 2.5]) - pit + box(12, 24, 1).translate([0, 0, 5.5])
+    over = layers.overhangs(built(body, step=0.2), 30.0)
+    worst = int(over.reach.argmax())
+    assert over.reach[worst] == pytest.approx(10.0 * np.sin(np.radians(half_deg)), abs=0.6)
+    assert over.places[worst][:2] == pytest.approx([6.0, 0.0], abs=0.3)
+    assert over.bridge[worst] == bridge
+
+
 @pytest.mark.parametrize(("slope", "hangs"), [(30.0, False), (10.0, True)])
 def test_slopes_steeper_than_the_limit_need_no_support(slope, hangs):
     from manifold3d import CrossSection
