@@ -165,6 +165,14 @@ def test_text_is_told_apart(name: str, line: str) -> None:
     assert decoder.counters.malformed == 0
 
 
+def test_two_rows_run_into_one_are_no_new_columns() -> None:
+    rows = [f"{10 * k},{k},7.5" for k in range(60)]
+    rows[30:32] = [rows[30] + rows[31]]
+    groups = fed(Decoder(), ("time_ms,light,dark\n" + "\n".join(rows) + "\n").encode())
+    assert {group.layout.channels for group in groups} == {("light", "dark")}
+    assert sum(len(group.values) for group in groups) == 58
+
+
 def test_csv_with_header_number_and_clock() -> None:
     rows = "".join(f"{k},{(2**32 - 30_000 + 1000 * k) % 2**32},{k / 10}\n" for k in range(100))
     decoder = Decoder()
