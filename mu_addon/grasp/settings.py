@@ -7,7 +7,9 @@ import attrs
 from ..design.quantity import described
 from ..design.settings import FRICTION
 
-SIDE = described("side_mm", 25.0, "side of the cube", unit="mm", low=0.1, high=200.0)
+SIDE = described(
+    "side_mm", 25.0, "side of the cube, in the middle between the tips", unit="mm", low=0.1, high=200.0
+)
 STEP_S = 0.5
 """Longest interval between instants in s."""
 DENSITY = described(

@@ -40,7 +40,6 @@ class MU_PT_optimize(UnitPanel, bpy.types.Panel):
         else:
             _targets(layout, props)
             _freedoms(layout, root, props)
-            layout.prop(props, "has_gravity")
             draw_settings(layout, fields_of(props, () if props.has_gravity else {"orientation_deg"}))
         if root.mu_unit.study.effects:
             wrapped(layout, "With the named effects that the panel Simulate lists", "LIGHT")

@@ -5,6 +5,7 @@
 import bpy
 from bpy.props import CollectionProperty, StringProperty
 
+from ...chain.settings import GRAVITY
 from ...design import lattice_kinds
 from ...design.anchors import windows
 from ...design.assets import asset_names
@@ -258,8 +259,9 @@ class MU_PG_optimize(bpy.types.PropertyGroup):
     freedoms: CollectionProperty(type=MU_PG_freedom, description="What may change")
     robust: blender_property(ROBUST)
     self_contact: blender_property(SELF_CONTACT, name="Self-Contact")
-    has_gravity: Flag(
-        "Own Weight", "The unit carries its weight; then an angle at 0 kPa can be a target", default=False
+    has_gravity: blender_property(
+        GRAVITY._replace(default=False, text=f"{GRAVITY.text}; then an angle at 0 kPa can be a target"),
+        name="Own Weight",
     )
     # Horizontal, where weight matters most.
     orientation_deg: blender_property(

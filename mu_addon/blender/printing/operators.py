@@ -130,7 +130,13 @@ def print_show(context, root, finding, place, view):
     UnitOperator,
     "Use Direction",
     direction=blender_property(
-        input_of("check", "direction"), options={"SKIP_SAVE"}, name="Up", size=3, subtype="XYZ", default=UP
+        input_of("check", "direction"),
+        options={"SKIP_SAVE"},
+        name="Up",
+        size=3,
+        precision=3,
+        subtype="XYZ",
+        default=UP,
     ),
 )
 def print_up(root, direction):

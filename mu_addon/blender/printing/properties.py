@@ -48,6 +48,7 @@ class MU_PG_printing(bpy.types.PropertyGroup):
         lambda settings, context: layer.follow(settings.id_data),
         name="Up",
         size=3,
+        precision=3,
         subtype="XYZ",
         default=UP,
     )

@@ -89,7 +89,7 @@ class MU_PG_bench(bpy.types.PropertyGroup):
         "Measure relative to the base in each frame, for a camera or clamp that moves; otherwise "
         "relative to its mean position, which gives less noise",
     )
-    fps: blender_property(input_of("track", "frame_rate"))
+    fps: blender_property(input_of("track", "frame_rate"), precision=2)
     starts_s: Number("Starts at (s)", "Time of the pressure's record at the clip's first frame", precision=3)
     pressure: blender_property(input_of("track", "pressure"), path=FILE)
     folder: path_property(
