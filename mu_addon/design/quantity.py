@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Iterator, Mapping, Sequence
+from functools import cache
 from typing import TYPE_CHECKING, Any, NamedTuple, TypeVar
 
 import attrs
@@ -178,9 +179,9 @@ def _parameter(
     return attrs.field(default=described.default, metadata=metadata, converter=converter)
 
 
-def _of_field(field: Any) -> Description:
+def _of_field(field: Any, group: str = "") -> Description:
     described, names = field.metadata["described"], field.metadata["names"]
-    found: Description = described._replace(name=field.name, choices=tuple(names()))
+    found: Description = described._replace(name=field.name, choices=tuple(names()), group=group)
     return found
 
 
@@ -189,11 +190,17 @@ def describe(section: type) -> Iterator[Description]:
 
     Its `advanced`, of type `Groups`, says which of them have a group.
     """
-    advanced = getattr(section, "advanced", {}).items()
-    for field in attrs.fields(section):
-        if "described" in field.metadata:
-            titles = (title for title, names in advanced if not names or field.name in names)
-            yield _of_field(field)._replace(group=next(titles, ""))
+    groups = _groups(section)
+    fields = attrs.fields(section)
+    return (_of_field(f, groups.get(f.name, "")) for f in fields if "described" in f.metadata)
+
+
+@cache
+def _groups(section: type) -> dict[str, str]:
+    """Group of each advanced parameter of a class, by name."""
+    every = [f.name for f in attrs.fields(section)]
+    advanced: Groups = getattr(section, "advanced", {})
+    return {name: title for title, names in advanced.items() for name in names or every}
 
 
 def where(instance: Any, name: str) -> str:

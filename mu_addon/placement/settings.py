@@ -13,12 +13,7 @@ OF_LATTICE = "paths through the whole lattice"
 """Group of settings of --paths graph."""
 # A window of h anchors is h - 1 cells long, so the source paper's h >= 3 is 2 cells.
 SHORTEST = described(
-    "shortest_cells",
-    2.0,
-    "length of the shortest path, in cells",
-    low=0.01,
-    high=1000.0,
-    group=OF_LATTICE,
+    "shortest_cells", 2.0, "length of the shortest path, in cells", low=0.01, high=1000.0, group=OF_LATTICE
 )
 LONGEST = described(
     "longest_cells",

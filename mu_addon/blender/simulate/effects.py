@@ -61,12 +61,9 @@ def inputs(root: Any) -> dict[str, Any]:
         name: {p: float(table["value"]) for p, table in parameters.items()}
         for name, parameters in _tables(root).items()
     }
-    turned = {"orientation_deg": _direction(root)} if WEIGHT in effects else {}
+    turn = exact(root.mu_unit.study.orientation_deg) % 360.0
+    turned = {"orientation_deg": turn} if WEIGHT in effects else {}
     return {**turned, "effects": effects} if effects else {}
-
-
-def _direction(root: Any) -> float:
-    return exact(root.mu_unit.study.orientation_deg) % 360.0
 
 
 def named_effects(root: Any) -> NamedEffects:

@@ -13,7 +13,7 @@ import numpy as np
 from bpy.props import CollectionProperty, PointerProperty, StringProperty
 
 from ...design.parameters import SECTIONS, Unit
-from ...design.quantity import Description, describe
+from ...design.quantity import describe
 from ...errors import InputError
 from ...fem.device import DEVICE
 from ...graph.definition import FILE
@@ -183,7 +183,8 @@ def section_of(props, section: str) -> dict:
     """Values of one section of a unit's properties, as the core's parameters."""
     group = getattr(props, section)
     (core,) = (s for s in SECTIONS if s.section == section)
-    values = {d.name: _value(d, getattr(group, d.name)) for d in describe(core)}
+    found = [(d, getattr(group, d.name)) for d in describe(core)]
+    values = {d.name: exact(value) if d.type is float else value for d, value in found}
     if section == "chambers":
         bladder = tied({"cell_mm": values["cell_mm"]})["bladder_diameter_mm"]
         # One value in two properties: single precision may round them apart.
@@ -215,7 +216,3 @@ def from_unit(props, unit: Unit) -> None:
     """Set Blender's properties to a unit; each still calls its update, see `updates.paused`."""
     props.title, props.scale = unit.name, unit.scale
     set_sections(props, SECTIONS, unit)
-
-
-def _value(d: Description, value):
-    return exact(value) if d.type is float else value
