@@ -34,6 +34,10 @@ WALL, HELD = "wall", "held"
 SMOOTH_CONTACT: NewtonSettings = attrs.evolve(
     RESOLVED_CONTACT_NEWTON, min_step_MPa=1e-3, max_factorisations=20, follow_snaps=False
 )
+# Of a unit of another design: where it snaps is part of its answer, and one whose path ends is left out.
+OTHER_CONTACT: NewtonSettings = attrs.evolve(
+    RESOLVED_CONTACT_NEWTON, min_step_MPa=1e-3, max_factorisations=32, max_iterations=60, indefinite_steps=2
+)
 
 
 @lru_cache(maxsize=2)
@@ -50,8 +54,8 @@ class Body:
 
     distal: number of chambers, from the tip, that a clog cuts off. orientation_deg, orientation_axis: see
     `unit_pose.down`. gap_mm: from the tip at rest to the load cell that holds it, None for a free tip. drawn:
-    the unit that an effect has changed into this one. self_contact: of walls and struts. device: Warp's, of a
-    model.
+    the unit that an effect has changed into this one. other: True for the unit of another design.
+    self_contact: of walls and struts. device: Warp's, of a model.
     """
 
     unit: Unit
@@ -61,6 +65,7 @@ class Body:
     orientation_axis: Direction = X
     gap_mm: float | None = None
     drawn: Unit | None = None
+    other: bool = False
     self_contact: bool = False
     device: str = "cpu"
 
@@ -93,6 +98,8 @@ class Body:
     def newton(self, effect: UnitEffect | None = None) -> NewtonSettings:
         """Settings of Newton's method for a run of this body, with an effect or without."""
         if self.self_contact:
+            if self.other:
+                return OTHER_CONTACT
             return RESOLVED_CONTACT_NEWTON if effect is None and self.drawn is None else SMOOTH_CONTACT
         return effect.newton if effect else RESOLVED_NEWTON
 

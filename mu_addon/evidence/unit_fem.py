@@ -14,6 +14,7 @@ import numpy as np
 from ..arrays import Array
 from ..body.printed_mesh import mesh_printed
 from ..design.parameters import Unit
+from ..design.quantity import in_kPa, in_MPa
 from ..errors import ConvergenceError, InputError
 from ..measured import Experiment
 from ..measured.pose import Direction, X
@@ -335,32 +336,72 @@ class _Plan:
         return attrs.evolve(self.case(), body=self.body)
 
     def of_designs(self, designs: Designs) -> list[Run]:
-        """A run of every design, on the mesh of changes, at this scale."""
+        """A run of every design, on the mesh of changes, at this scale, as far as the readings go."""
         case, cases = self.case(), []
+        steps = self._steps
         for unit in designs.units:
-            drawn = similar(attrs.evolve(unit, scale=self.scale))
-            other = attrs.evolve(case, body=attrs.evolve(case.body, unit=drawn), outline=False)
-            cases.append(case if drawn == case.body.unit else other)
+            body = attrs.evolve(case.body, unit=similar(attrs.evolve(unit, scale=self.scale)), other=True)
+            other = attrs.evolve(case, body=body, pressures_kPa=steps, outline=False)
+            cases.append(case if body.unit == case.body.unit else other)
         return cases
 
-    def surface(self, shown: Shown) -> Surface | None:
-        """The response over the designs; those that do not reach a pressure are left out with a warning."""
+    @property
+    def _steps(self) -> tuple[float, ...]:
+        """Pressures in kPa of other designs, ascending through 0, to the ends of the readings.
+
+        Those that a path visits anyway, by its largest steps: a state on the way costs nothing. Where nothing
+        was read, to the base's end.
+        """
+        ends = pressures(np.array(self.readings_kPa), FEWEST, 0.0)
+        newton = attrs.evolve(self.body, other=True).newton()
+        sides = []
+        for read, end in zip(
+            (ends[0], ends[-1]), (self.pressures_kPa[0], self.pressures_kPa[-1]), strict=True
+        ):
+            step = in_kPa(newton.largest_step_MPa(in_MPa(end)))
+            count = max(FEWEST - 1, math.ceil(abs(read) / step - 1e-9)) if read else 1
+            sides.append(np.linspace(0.0, read or end, count + 1)[1:])
+        return (*sides[0][::-1].tolist(), 0.0, *sides[1].tolist())
+
+    def _of_design(self, case: Run, rows: Sequence[int], at: Array, coarse: Array) -> Array:
+        """Channels (c, k) of another design at pressures (k,) in kPa, on the mesh of changes.
+
+        coarse (c, k): the unit's on that mesh. Beyond the design's own pressures their difference grows in
+        proportion to pressure: there it serves a softer resin alone, and a body that collapses costs most.
+        """
+        from scipy.interpolate import CubicSpline
+
+        own = np.array(case.pressures_kPa)
+        values = (self.larger * self.result(case).values)[rows]
+        if not np.isfinite(values).all():
+            return np.full_like(coarse, np.nan)
+        change = CubicSpline(own, values - CubicSpline(at, coarse, axis=1)(own), axis=1)
+        inside = np.clip(at, own[0], own[-1])
+        grown = np.divide(at, inside, out=np.ones_like(at), where=inside != 0.0)
+        return np.asarray(coarse + grown * change(inside))
+
+    def surface(self, rows: Sequence[int], at: Array, base: Array, coarse: Array) -> Surface | None:
+        """The response over the designs; those that do not reach a pressure are left out with a warning.
+
+        rows: of the channels. base, coarse (c, k): the unit's at pressures (k,) in kPa, on both meshes.
+        """
         designs = self.settings.designs
         if designs is None:
             return None
-        at, values = [], []
+        places, values, rest = [], [], int(np.flatnonzero(at == 0.0)[0])
         for place, case in zip(designs.at, self.of_designs(designs), strict=True):
-            result = self.result(case)
-            response = shown(self._taken_over(result))
+            response = base
+            if case.body.other:
+                response = taken_over(self._of_design(case, rows, at, coarse), coarse, base, rest)
             if np.isnan(response).any():
                 pairs = zip(designs.parameters, place, strict=True)
                 shape = ", ".join(f"{p.name} {v:g}" for p, v in pairs)
-                _warn(f"{shape} at {self.scale:g}x is left out: {result.why}")
+                _warn(f"{shape} at {self.scale:g}x is left out: {self.result(case).why}")
             else:
-                at.append(place)
+                places.append(place)
                 values.append(response)
-        require_enough(len(at), len(designs.parameters))
-        return Surface(designs.parameters, np.array(at), np.array(values))
+        require_enough(len(places), len(designs.parameters))
+        return Surface(designs.parameters, np.array(places), np.array(values))
 
     def runs(self) -> Iterator[Run]:
         """First the runs that runs of effects start from, then the longest."""
@@ -476,7 +517,11 @@ class _Plan:
         at, shown = self._shown(rows, reached)
         values = shown(self.base)
         walls = self.sides(rows) if CONTACT in self.settings.effects else {}
-        surface, errors = self.surface(shown), self._mesh_errors(at, values, values - shown(self.coarse))
+        coarse = shown(self.coarse)
+        surface, errors = (
+            self.surface(rows, at, values, coarse),
+            self._mesh_errors(at, values, values - coarse),
+        )
         gap = (self.body.gap_mm or 0.0) * self.enlarged
         for turn, axis in self.orientations:
             found = {n: self._variant(n, (turn, axis), shown) for n in self.names}
@@ -544,16 +589,9 @@ class _Plan:
         return Result(values, result.why)
 
     def _taken_over(self, result: Result) -> Result:
-        """The base's response with an effect, from its change of the coarser mesh's.
-
-        In proportion to how far both move from rest, which differs by the meshes' errors.
-        """
+        """The base's response with an effect, from its change of the coarser mesh's."""
         rest = self.pressures_kPa.index(0.0)
-        base, coarse = self.base.values, self.coarse.values
-        far, near = (values - values[:, [rest]] for values in (base, coarse))
-        least = (LEAST_CHANGE * np.nanmax(np.abs(near), axis=1, keepdims=True)) ** 2
-        ratio = (far * near + least) / np.maximum(near**2 + least, np.finfo(float).tiny)
-        return Result(base + ratio * (result.values - coarse), result.why)
+        return Result(taken_over(result.values, self.coarse.values, self.base.values, rest), result.why)
 
     def _mesh_errors(self, at: Array, base: Array, way: Array) -> dict[str, Variant]:
         """Errors of the model's mesh, everywhere and at each suction, at pressures (k,) in kPa.
@@ -570,6 +608,18 @@ class _Plan:
             p = Parameter(name, "", -most, most, 0.0, source="two meshes differ by 1", spread=spread)
             found[name] = Variant(p, sizes, np.array([base + size * share * way for size in sizes]))
         return found
+
+
+def taken_over(changed: Array, coarse: Array, base: Array, rest: int) -> Array:
+    """The base's values (c, k) with a change, from those of a coarser mesh with it and without, (c, k) each.
+
+    In proportion to how far both move from rest, which differs by the meshes' errors. rest: the column
+    without pressure.
+    """
+    far, near = (values - values[:, [rest]] for values in (base, coarse))
+    least = (LEAST_CHANGE * np.nanmax(np.abs(near), axis=1, keepdims=True)) ** 2
+    ratio = (far * near + least) / np.maximum(near**2 + least, np.finfo(float).tiny)
+    return np.asarray(base + ratio * (changed - coarse))
 
 
 def _warn(text: str) -> None:

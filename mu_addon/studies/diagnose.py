@@ -93,6 +93,11 @@ def _bends(study: Diagnose) -> bool:
     return bool(evidence.bends(study.data.experiments))
 
 
+def _names(study: Diagnose) -> bool:
+    # While dimensions are unknown, none is.
+    return _bends(study) and study.unknown is None
+
+
 def _looks(study: Diagnose) -> bool:
     return any(e.role == "fit" for e in evidence.bending_freely(study.data.experiments))
 
@@ -103,7 +108,12 @@ def _has(title: str) -> Callable[[Diagnose], bool]:
 
 def _simulating(title: str) -> Callable[[Diagnose], float]:
     of = FREE if title in SHARES else title
-    return lambda study: SHARES.get(title, 1.0) * study.simulations.get(of, 0.1)
+
+    def seconds(study: Diagnose) -> float:
+        at_once = title == EFFECTS and study.unknown is not None
+        return 0.1 if at_once else SHARES.get(title, 1.0) * study.simulations.get(of, 0.1)
+
+    return seconds
 
 
 def _judging(study: Diagnose) -> float:
@@ -158,7 +168,7 @@ class Diagnose(Study):
         UnknownInput,
         "unknown",
         "TOML file with [[freedom]] tables, as of `optimize`: parameters of the unit's design that nobody "
-        "measured, with bounds; they are fitted beside every cause, and shapes.csv says which fit; empty: "
+        "measured, with bounds; they are fitted, no cause is named, and shapes.csv says which fit; empty: "
         "none",
         metavar="FILE",
     )
@@ -191,11 +201,15 @@ class Diagnose(Study):
         unknown: Unknown | None,
         unit: design.Unit | None,
     ) -> evidence.UnitSettings:
-        """Settings of the unit's simulation."""
+        """Settings of the unit's simulation.
+
+        While dimensions are unknown, no cause is named: what effects change in the unit is not simulated,
+        which would be of another shape than the one that fits.
+        """
         found = settings or evidence.UnitSettings(self_contact=self_contact)
         if unknown is None or unit is None or found.designs:
             return found
-        return attrs.evolve(found, designs=unknown.designs(unit))
+        return attrs.evolve(found, designs=unknown.designs(unit), effects=())
 
     @derived
     def experiments(self, data: measured.Measured) -> Experiments:
@@ -276,17 +290,16 @@ class Diagnose(Study):
 
         return judged_by(experiments, before, lattice, (effects, held), tell)
 
-    @stage(SIZES, lambda study: _simulating(SIZES)(study) + _judging(study), wanted=_bends, kept=False)
+    @stage(SIZES, lambda study: _simulating(SIZES)(study) + _judging(study), wanted=_names, kept=False)
     def whole(
         self, experiments: Experiments, unit: design.Unit, simulating: evidence.UnitSettings,
         before: Mapping[str, float], first: Judging, tell: Tell,
-        lattice: Simulated | None = None, shaped: Shaped | None = None,
+        lattice: Simulated | None = None,
     ) -> Judging:  # fmt: skip
         """The verdict with every effect in question at all its sizes."""
         from ..diagnose.judged_data import with_all_sizes
 
-        settings = shaped.settings if shaped else simulating
-        return with_all_sizes(first, experiments, unit, settings, before, lattice, tell)
+        return with_all_sizes(first, experiments, unit, simulating, before, lattice, tell)
 
     @intermediate()
     def found(

@@ -1,5 +1,6 @@
 """The unit's simulated responses: exact at nulls, kept and found again, right in sign; its markers."""
 
+from types import SimpleNamespace
 from unittest import mock
 
 import attrs
@@ -25,7 +26,7 @@ from mu_addon.evidence.unit_fem import (
     run,
     unit_responses,
 )
-from mu_addon.evidence.unit_run import _from_beside
+from mu_addon.evidence.unit_run import _from_beside, _states
 from mu_addon.fem.clogged import CloggedModel
 from mu_addon.fem.equilibrium import Equilibrium
 from mu_addon.fem.model import Model
@@ -519,3 +520,34 @@ def test_a_change_goes_on_beyond_the_readings_alone():
     # At -12 kPa 1.5 times the change at -8 kPa; at 12 kPa, which was read, nothing is made up.
     np.testing.assert_allclose(found.values, [[-29.0, -11.0, 0.0, 4.0, np.nan]])
     assert found.why == "it collapses"
+
+
+def test_another_design_ends_with_the_readings_and_its_change_goes_on_in_proportion():
+    at = np.array([-12.0, -6.0, 0.0, 24.0, 48.0])
+    plan = planned(UnitSettings(), tuple(at.tolist()), (-10.0, 40.0))
+    designs = SimpleNamespace(units=(UNIT, UNIT.evolve(wall_mm=1.1 * UNIT.chambers.wall_mm)))
+    same, other = plan.of_designs(designs)
+    assert same == plan.case()
+    own = np.array(other.pressures_kPa)
+    assert (own[0], own[-1], np.abs(np.diff(own)).max()) == (-10.0, 40.0, 2.5)
+    plan.found.__getitem__.return_value = Result((0.5 * own + 0.01 * own**2)[None])
+    found = plan._of_design(other, [0], at, 0.5 * at[None]) - 0.5 * at
+    np.testing.assert_allclose(found, [[1.2, 0.36, 0.0, 5.76, 19.2]], atol=1e-9)
+    unread = attrs.evolve(plan, readings_kPa=(0.0, 40.0)).of_designs(designs)[1]
+    assert unread.pressures_kPa[:2] == (-12.0, 0.0)
+
+
+@pytest.mark.parametrize(("other", "tried"), [(True, [0.01, 0.02]), (False, [-0.01, 0.01, 0.02])])
+def test_another_design_ends_where_one_pressure_is_not_reached_and_sucks_last(other, tried):
+    seen = []
+
+    def reach(target, history):
+        seen.append(target)
+        if target == 0.02:
+            raise ConvergenceError("it bursts")
+        return history[-1]
+
+    case = Run(Body(UNIT, other=other), (-10.0, 0.0, 10.0, 20.0, 30.0))
+    with pytest.raises(ConvergenceError, match="it bursts"):
+        list(_states(SimpleNamespace(reach=reach), case, None))
+    assert seen == tried

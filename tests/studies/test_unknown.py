@@ -4,6 +4,7 @@ import csv
 import json
 from pathlib import Path
 
+import attrs
 import numpy as np
 import pytest
 
@@ -15,7 +16,7 @@ from mu_addon.evidence.unit_fem import UnitSettings
 from mu_addon.evidence.unit_run import Result
 from mu_addon.measured import read_folder
 from mu_addon.meshing.settings import MeshSettings
-from mu_addon.studies.diagnose import Diagnose
+from mu_addon.studies.diagnose import EFFECTS, SIZES, Diagnose
 
 from ..evidence.hollow_finger import finger
 from .unit_runs import ended
@@ -115,6 +116,11 @@ def test_a_run_with_unknown_parameters_is_read_again(tmp_path):
     again = Diagnose.read(tmp_path)
     assert again.texts() == job.texts()
     assert simulating(again).designs.units == simulating(job).designs.units
+    # No cause is named: no effect of the unit is simulated, nor told.
+    assert not simulating(job).effects
+    told, known = job.expected(), attrs.evolve(job, unknown=None).expected()
+    assert told[EFFECTS] < 1.0 < known[EFFECTS]
+    assert (SIZES in told, SIZES in known) == (False, True)
 
 
 @pytest.mark.parametrize(
@@ -140,7 +146,7 @@ def test_a_file_that_cannot_be_used_is_refused_by_place(old, new, what):
 def test_the_shipped_file_of_the_papers_shape_is_of_the_preset():
     text = (PAPER / "unknown.toml").read_text()
     designs = read_unknown(text, "unknown.toml", UNIT).designs(UNIT)
-    assert len(designs.units) == 7
+    assert len(designs.units) == 9
     assert {u.chambers.wall_mm for u in designs.units} >= {0.4, 0.9}
 
 
