@@ -16,7 +16,7 @@ from ..design.parameters import Unit
 from ..design.quantity import described
 from ..errors import InputError
 from ..evidence.diagnosis import noise_of
-from ..evidence.drawn import Designs, Surface, require_enough
+from ..evidence.drawn import LEADING, ROUNDS, Designs, Surface, require_enough
 from ..evidence.effect import Parameter
 from ..evidence.fit import Fit, Fitter, interval
 from ..evidence.prediction.unit_pressure import MODULUS, zero_of
@@ -36,8 +36,6 @@ COUNT = described(
 )  # fmt: skip
 SECTIONS = ("chambers", "lattice")
 """Sections of a unit whose parameters may be unknown: moduli are fitted anyway, and print is an effect's."""
-ROUNDS, LEADING = 2, 2
-"""Times that the shapes that fit best are simulated themselves, and how many of them each time."""
 DIGITS = 3
 """Of a proposed length: more would make another unit of the same shape."""
 CORNERS = 3

@@ -16,6 +16,8 @@ from .effect import Parameter
 
 # More than parameters by so many: a plane has a constant, and one design left out tells its error.
 SPARE = 2
+ROUNDS, LEADING = 2, 2
+"""Times that the shapes that fit best are simulated themselves, and how many of them each time."""
 
 
 @attrs.frozen(eq=False)
@@ -91,10 +93,10 @@ class Surface:
         found = np.full_like(self.values, np.nan)
         for i in range(len(self.at)):
             kept = np.arange(len(self.at)) != i
-            try:
-                other = self._basis(kept)(self.places(self.at[i])).reshape(self.values.shape[1:])
-            except (np.linalg.LinAlgError, ValueError):
-                # The others lie in a plane.
+            places = self.places(self.at[kept])
+            if np.linalg.matrix_rank(places[1:] - places[0]) < len(self.parameters):
+                # The others lie in a plane, on which rounding decides.
                 continue
+            other = self._basis(kept)(self.places(self.at[i])).reshape(self.values.shape[1:])
             found[i] = other - self.values[i]
         return found

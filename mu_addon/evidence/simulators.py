@@ -13,6 +13,7 @@ from ..errors import InputError
 from ..measured import Experiment
 from ..measured.kinds import OF_A_UNIT
 from ..run.progress_estimate import Plan
+from .drawn import LEADING, ROUNDS
 from .prediction import blocked_force, pressure_step, unit_pose, unit_pressure
 from .simulator import Simulator
 
@@ -28,7 +29,7 @@ BASE = "unit"
 """Stage of a unit that bends freely."""
 HELD = "unit with its tip held"
 """Stage of a unit on a load cell."""
-DESIGNS, DESIGN_S = "unit of every design", 50.0
+DESIGNS, DESIGN_S = "unit of every design", 60.0
 """Stage of units with other values of unknown parameters, and the seconds of one of them."""
 TOUCHING_KPA, TOUCHING = -8.0, 2.0
 """Reading below which walls of a unit may touch, and the factor on its seconds then."""
@@ -56,7 +57,9 @@ def simulations_plan(experiments: Sequence[Experiment], behind: Unit | None, set
             lattice = [(LATTICE, 0.2 + LATTICE_S * to_compute(experiments, behind))]
     free = [(BASE, unit)] if kinds & set(FREE) else []
     if settings.designs:
-        free.append((DESIGNS, DESIGN_S * len(settings.designs.units)))
+        # The unit as given is simulated anyway.
+        simulated = len(settings.designs.units) - 1 + ROUNDS * LEADING
+        free.append((DESIGNS, DESIGN_S * simulated))
     return [*lattice, *free, *([(HELD, unit)] if blocked_force.KIND in kinds else [])]
 
 

@@ -58,6 +58,19 @@ def test_a_surface_goes_through_its_designs_and_is_none_at_the_null():
         np.testing.assert_allclose(found, values, atol=1e-8)
 
 
+def test_a_design_without_which_the_others_lie_in_a_plane_tells_no_error():
+    # Of the paper's unknown shape: rounding hides that the others, in five dimensions, lie in a plane.
+    ranges = ((0.4, 0.9), (9.0, 16.0), (0.4, 0.8), (2.0, 4.0), (3.0, 5.0))
+    parameters = tuple(Parameter(f"p{i}", "", *ends, ends[0]) for i, ends in enumerate(ranges))
+    centre, outer = (0.65, 12.5, 0.6, 3.0, 5.0), ((0.4, 9.0, 0.4, 2.0, 3.0), (0.4, 9.0, 0.4, 4.0, 5.0))
+    thick = ((0.9, 9.0, 0.8, 2.0, 5.0), (0.9, 9.0, 0.8, 4.0, 3.0), (0.9, 16.0, 0.4, 2.0, 5.0))
+    at = np.array([(0.9, 12.5, 0.6, 2.0, 3.0), centre, *outer, *thick])
+    values = np.random.default_rng(2).normal(size=(len(at), 1, 3))
+    found = Surface(parameters, at, values).errors
+    assert np.flatnonzero(np.isnan(found).any(axis=(1, 2))).tolist() == [1, 4]
+    assert np.nanmax(np.abs(found)) < 100.0
+
+
 def test_too_few_designs_are_refused():
     unit = load_preset("mu-1.0x")
     with pytest.raises(InputError, match="too few"):
