@@ -34,9 +34,15 @@ WALL, HELD = "wall", "held"
 SMOOTH_CONTACT: NewtonSettings = attrs.evolve(
     RESOLVED_CONTACT_NEWTON, min_step_MPa=1e-3, max_factorisations=20, follow_snaps=False
 )
-# Of a unit of another design: where it snaps is part of its answer, and one whose path ends is left out.
+# Of a unit of another design, left out where its path ends: of eight six took no step below 2 kPa and did not
+# snap, two ended at 30 and 32.5 kPa. Damped motion moved one of these by 26 mm in 93 s and did not end.
 OTHER_CONTACT: NewtonSettings = attrs.evolve(
-    RESOLVED_CONTACT_NEWTON, min_step_MPa=1e-3, max_factorisations=32, max_iterations=60, indefinite_steps=2
+    RESOLVED_CONTACT_NEWTON,
+    min_step_MPa=2e-3,
+    max_factorisations=32,
+    max_iterations=60,
+    indefinite_steps=2,
+    follow_snaps=False,
 )
 
 
