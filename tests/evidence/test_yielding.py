@@ -54,3 +54,15 @@ def test_rows_between_change_nothing(strain, between):
     fine = np.concatenate([np.linspace(a, b, between + 1)[1:] for a, b in itertools.pairwise(ends)])
     found = elastic_strain(fine, VALUES)[between - 1 :: between]
     assert found == pytest.approx(elastic_strain(strain, VALUES), abs=1e-12)
+
+
+@given(arrays(float, st.integers(1, 40), elements=st.floats(-0.2, 0.2)))
+def test_it_is_elements_in_parallel_that_yield_one_after_the_other(strain):
+    """Ishlinskii's: exponentially distributed yield strains, their shares at quantiles."""
+    yields = -M * np.log1p(-(np.arange(2000) + 0.5) / 2000)
+    borne, found = np.zeros_like(yields), []
+    for step in np.diff(strain, prepend=0.0):
+        borne = np.clip(borne + step, -yields, yields)
+        found.append(borne.mean())
+    expected = H * strain + (1 - H) * np.array(found)
+    assert elastic_strain(strain, VALUES) == pytest.approx(expected, abs=1e-4 * M)

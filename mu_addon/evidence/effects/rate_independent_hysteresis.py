@@ -1,6 +1,7 @@
 """Rate-independent hysteresis."""
 
 import math
+from bisect import bisect_right
 from functools import lru_cache
 from itertools import pairwise
 
@@ -69,33 +70,55 @@ def _elastic(strain: Array, v: Values, at: Setting) -> Array:
 # A derivative by any other parameter needs the same history again, of each experiment.
 @lru_cache(maxsize=256)
 def _by_masing(strain: bytes, per_strain: float, hardening: float) -> Array:
-    """Elastic strain (n,), read-only, of the bytes of strains (n,), see `elastic_strain`."""
+    """Elastic strain (n,), read-only, of the bytes of strains (n,), see `_elastic`.
+
+    Branches by the turning points that the material remembers at each of their samples, then all samples at
+    once.
+    """
 
     def first(e: float) -> float:
         # Of a mean strain m beyond all numbers it is e itself, and m alone would be infinite.
         x = abs(e) * per_strain
         return hardening * e + (1.0 - hardening) * e * (-math.expm1(-x) / x if x else 1.0)
 
-    found = []
+    x = np.frombuffer(strain)
+    way, back = x.tolist(), (-x).tolist()
+    rows = np.flatnonzero(steps := np.diff(x, prepend=0.0))
+    rises = steps[rows] > 0.0
+    reversals = rows[np.flatnonzero(np.diff(rises)) + 1].tolist()
+    rising = not len(rises) or bool(rises[0])
     # Turning points, in pairs of strain and elastic strain, as far as the material remembers.
     turns = [(0.0, 0.0)]
-    last, elastic, rising = 0.0, 0.0, True
-    for e in np.frombuffer(strain).tolist():
-        if e != last and (e > last) != rising:
-            rising = e > last
-            if turns[-1] != (last, elastic):
-                turns.append((last, elastic))
-        # A loop that closes is forgotten, and so is the first turn beyond its mirror image.
-        while len(turns) > 2 and (e > turns[-2][0] if rising else e < turns[-2][0]):
-            del turns[-2:]
-        if len(turns) == 2 and abs(e) > abs(turns[1][0]):
-            del turns[1]
-        at, then = turns[-1]
-        last, elastic = e, first(e) if len(turns) == 1 else then + 2.0 * first(0.5 * (e - at))
-        found.append(elastic)
-    kept = np.array(found)
-    kept.flags.writeable = False
-    return kept
+    begun: list[int] = []
+    branches: list[tuple[float, float, float]] = []
+    for start, end in pairwise((0, *reversals, len(x))):
+        if start:
+            last, (at, then, scale) = way[start - 1], branches[-1]
+            turn = last, then + scale * first((last - at) / scale)
+            if turns[-1] != turn:
+                turns.append(turn)
+            rising = not rising
+        k, sign, ascends = start, *((1.0, way) if rising else (-1.0, back))
+        while k < end:
+            e = way[k]
+            # A loop that closes is forgotten, and so is the first turn beyond its mirror image.
+            while len(turns) > 2 and sign * e > sign * turns[-2][0]:
+                del turns[-2:]
+            if len(turns) == 2 and abs(e) > abs(turns[1][0]):
+                del turns[1]
+            begun.append(k)
+            branches.append((*turns[-1], 2.0 if len(turns) > 1 else 1.0))
+            if len(turns) == 1:
+                break
+            closes = sign * turns[-2][0] if len(turns) > 2 else abs(turns[1][0])
+            k = bisect_right(ascends, closes, k + 1, end)
+    at, then, scale = np.repeat(np.array(branches), np.diff([*begun, len(x)]), axis=0).T
+    u = (x - at) / scale
+    m = np.abs(u) * per_strain
+    yields = np.divide(-np.expm1(-m), m, out=np.ones_like(m), where=m > 0.0)
+    found = then + scale * u * (hardening + (1.0 - hardening) * yields)
+    found.flags.writeable = False
+    return found
 
 
 def _yielded(stress: Array, v: Values, at: Setting) -> Array:
