@@ -14,7 +14,8 @@ from __future__ import annotations
 import json
 import resource
 import time
-from collections.abc import Callable
+from argparse import Namespace
+from collections.abc import Callable, Mapping
 from pathlib import Path
 
 import attrs
@@ -22,7 +23,7 @@ import numpy as np
 
 from benchmarks.evidence.second_code.judging import verdict_on
 from benchmarks.evidence.second_code.recording import Trial, instrument, read, write
-from benchmarks.table import circumstances, options_of, print_row
+from benchmarks.table import circumstances, options_of, print_head, print_row
 from mu_addon.design.parameters import load_preset, to_toml
 from mu_addon.evidence.unit_body import Body
 from mu_addon.evidence.unit_run import Run, run
@@ -38,7 +39,7 @@ Array = np.ndarray
 Drive = Callable[[Array, Array], Array]
 
 
-def _lagging(time_s: float) -> Drive:
+def lagging(time_s: float) -> Drive:
     """What follows a pressure (n,) at times (n,) with a time of its own, by implicit steps."""
 
     def follow(t: Array, p: Array) -> Array:
@@ -50,8 +51,8 @@ def _lagging(time_s: float) -> Drive:
     return follow
 
 
-def _relaxed(t: Array, p: Array) -> Array:
-    return 0.85 * p + 0.15 * _lagging(8.0)(t, p)
+def relaxed(t: Array, p: Array) -> Array:
+    return 0.85 * p + 0.15 * lagging(8.0)(t, p)
 
 
 @attrs.frozen
@@ -87,12 +88,12 @@ SETS = {
     "large offset": Hidden(drive=lambda t, p: p - 1.5),
     "gauge": Hidden(drive=lambda t, p: p * (1.0 + 0.12 * (1.0 - np.abs(p) / HIGH_kPa))),
     "supply": Hidden(drive=lambda t, p: np.minimum(p, 0.75 * HIGH_kPa)),
-    "line": Hidden(drive=_lagging(0.5)),
+    "line": Hidden(drive=lagging(0.5)),
     "leak": Hidden(drive=lambda t, p: p / 1.25, shut="slow"),
-    "resin": Hidden(drive=_relaxed),
-    "resin, overcure": Hidden("overcure", 0.1, _relaxed),
-    "resin, offset": Hidden(drive=lambda t, p: _relaxed(t, p - 0.8)),
-    "resin, obstacle": Hidden("contact", -1.0, _relaxed),
+    "resin": Hidden(drive=relaxed),
+    "resin, overcure": Hidden("overcure", 0.1, relaxed),
+    "resin, offset": Hidden(drive=lambda t, p: relaxed(t, p - 0.8)),
+    "resin, obstacle": Hidden("contact", -1.0, relaxed),
 }
 
 
@@ -111,11 +112,13 @@ def angles(hidden: Hidden, refine: float, low: float, folder: Path) -> tuple[Arr
     return pressures[np.isfinite(bent)], bent[np.isfinite(bent)]
 
 
-def trials(hidden: Hidden, rng: np.random.Generator, bent: tuple[Array, Array], low: float) -> list[Trial]:
-    """Readings of a ladder, a slow and a fast wave of pressure, from `low` in kPa."""
+def trials(
+    hidden: Hidden, rng: np.random.Generator, bent: tuple[Array, Array], low: float, high: float = HIGH_kPa
+) -> list[Trial]:
+    """Readings of a ladder, a slow and a fast wave of pressure, from `low` to `high` in kPa."""
     from scipy.interpolate import CubicSpline
 
-    bends, high = CubicSpline(*bent), HIGH_kPa
+    bends = CubicSpline(*bent)
     protocols = {
         "ladder": ([0, 20, 60, 100, 140, 180, 200], [0, high / 2, high / 2, high, low / 2, low, 0]),
         "slow": ([0, 40, 120, 200, 240], [0, high, low, high, 0]),
@@ -136,27 +139,40 @@ def trials(hidden: Hidden, rng: np.random.Generator, bent: tuple[Array, Array], 
 
 def main() -> None:
     """Make every set, have it diagnosed, and print a row each."""
-    parser = options_of(__doc__)
+    given = options(__doc__, SETS, 1.2, LOW_kPa)
+    judge(given, SETS, HIGH_kPa, lambda hidden: angles(hidden, given.refine, given.low, given.folder))
+
+
+def options(page: str | None, sets: Mapping[str, Hidden], refine: float, low: float) -> Namespace:
+    """What is given: folder, sets, mesh of the data, seed and least pressure, whose folder is made."""
+    parser = options_of(page)
     parser.add_argument("folder", type=Path)
-    parser.add_argument("--only", default=";".join(SETS), help="names of sets, apart by ;")
-    parser.add_argument("--refine", type=float, default=1.2, help="of the mesh that the data are of")
+    parser.add_argument("--only", default=";".join(sets), help="names of sets, apart by ;")
+    parser.add_argument("--refine", type=float, default=refine, help="of the mesh that the data are of")
     parser.add_argument("--seed", type=int, default=1)
-    parser.add_argument("--low", type=float, default=LOW_kPa, help="least pressure, kPa")
+    parser.add_argument("--low", type=float, default=low, help="least pressure, kPa")
     given = parser.parse_args()
     given.folder.mkdir(parents=True, exist_ok=True)
+    return given
+
+
+def judge(
+    given: Namespace,
+    sets: Mapping[str, Hidden],
+    high: float,
+    bending: Callable[[Hidden], tuple[Array, Array]],
+) -> None:
+    """Print a row a set: its verdict on readings up to `high` in kPa, of a unit's `bending` as `angles`."""
     unit = given.folder / "unit.toml"
     write_text(unit, to_toml(UNIT))
     print(circumstances())
-    print(
-        "| set | verdict | causes, rivals | by the clock, s | of the processor, s |\n" + "| --- " * 5 + "|",
-        flush=True,
-    )
+    print_head("set", "verdict", "causes, rivals", "by the clock, s", "of the processor, s")
     for name in given.only.split(";"):
-        bent = angles(SETS[name], given.refine, given.low, given.folder)
+        bent = bending(sets[name])
         data = given.folder / f"{name}-{given.refine:g}-{given.seed}-from{given.low:g}"
         if not data.exists():
-            rng = np.random.default_rng([given.seed, list(SETS).index(name)])
-            write(data, trials(SETS[name], rng, bent, given.low))
+            rng = np.random.default_rng([given.seed, list(sets).index(name)])
+            write(data, trials(sets[name], rng, bent, given.low, high))
         began, used = time.time(), _processor_s()
         found = verdict_on(data, unit, given.folder / "diagnosis")
         write_text(given.folder / f"{data.name}.json", json.dumps(found, indent=1))
