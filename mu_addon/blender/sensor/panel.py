@@ -49,9 +49,12 @@ class MU_PT_sensor(UnitPanel, bpy.types.Panel):
             count = counted(len(sensor.others(root)), "sensor", "sensors")
             wrapped(layout, f"{count} of other units connected", "INFO")
             layout.operator("mu.sensor_disconnect", text="Disconnect Them", icon="UNLINKED").others = True
-        _plot(layout, root.mu_sensor, session)
         _calibration(layout, root, session)
         _twin(layout, root)
+        # What grows with the channels stands below what is pressed meanwhile.
+        _plot(layout, root.mu_sensor, session)
+        if session is not None:
+            _readings(layout, session)
 
 
 def _source(layout, settings):
@@ -93,14 +96,25 @@ def _session(layout, settings, session):
         if session.state == "connected" and not session.fresh:
             words, icon = "Connected, no samples", "ERROR"
         port = f": {status['port']}" if status.get("port") and session.state == "connected" else ""
-        wrapped(box, f"{words}{port}", icon)
-    if not status:
-        return
+        box.label(text=f"{words}{port}", icon=icon)
+    # As many lines before the first sample as after it: buttons stay under the mouse.
     column = box.column(align=True)
     column.label(text=f"{_format(status)}, {status.get('rate_hz', 0):.0f} Hz")
     column.label(text=f"{status.get('rows', 0)} samples on disk in {status.get('duration_s', 0):.0f} s")
     losses = [f"{status[key]} {word}" for key, word in LOSSES.items() if status.get(key)]
     wrapped(column, ", ".join(losses) or "Nothing lost", "ERROR" if losses else "CHECKMARK")
+    if session.trouble:
+        box.alert = True
+        wrapped(box, session.trouble, "ERROR")
+    row = box.row(align=True)
+    row.operator("mu.sensor_open", text="Recording", icon="FILE_FOLDER").what = "recording"
+    if session.running:
+        row.operator("mu.sensor_mark", icon="BOOKMARKS")
+
+
+def _readings(layout, session):
+    """What comes and goes with the samples, below all buttons."""
+    status, column = session.watched.status, layout.column(align=True)
     for words in status.get("complaint", ()):
         wrapped(column, in_panel(words), "INFO")
     for name, value in zip(session.channels, list(status.get("latest", ()))[3:], strict=False):
@@ -112,13 +126,6 @@ def _session(layout, settings, session):
         row = column.row()
         row.label(text=f"Angle {reading.angle_deg:.1f}°", icon="NONE" if reading.possible else "ERROR")
         row.label(text=f"{reading.low_deg:.1f} to {reading.high_deg:.1f}°")
-    if session.trouble:
-        box.alert = True
-        wrapped(box, session.trouble, "ERROR")
-    row = box.row(align=True)
-    row.operator("mu.sensor_open", text="Recording", icon="FILE_FOLDER").what = "recording"
-    if session.running:
-        row.operator("mu.sensor_mark", icon="BOOKMARKS")
 
 
 def _format(status) -> str:
@@ -196,12 +203,9 @@ def _guide(layout, guide):
         wrapped(box, f"Hold still at {guide.angles[guide.held - 1]:g}°: {left:.1f} s", "TIME")
     elif guide.held < len(guide.angles):
         angle = guide.angles[guide.held]
-        wrapped(box, f"Bend to {angle:g}°, hold it there, then press", "FORWARD")
-    odd = guide.odd
-    if odd is not None:
-        # It stands where it was pressed: no popup covers the buttons.
-        words = f"Number {odd + 1}, {guide.angles[odd]:g}°, breaks the order of the light"
-        alert(box, f"{words}: go back to it and repeat it")
+        wrapped(box, f"Bend to {angle:g}°, hold, press", "FORWARD")
+    else:
+        wrapped(box, "Every angle is held", "CHECKMARK")
     row = box.row(align=True)
     row.scale_y = 1.6
     text = f"At {guide.angles[guide.held]:g}°" if guide.held < len(guide.angles) else "Done"
@@ -209,6 +213,11 @@ def _guide(layout, guide):
     row.operator("mu.sensor_back", icon="LOOP_BACK")
     box.progress(factor=guide.held / len(guide.angles), text=f"{guide.held} of {len(guide.angles)}")
     box.operator("mu.sensor_sweep", text="Stop", icon="CANCEL").on = False
+    odd = guide.odd
+    if odd is not None:
+        # Below what was pressed, which it neither moves nor covers.
+        words = f"Number {odd + 1}, {guide.angles[odd]:g}°, breaks the order of the light"
+        alert(box, f"{words}: go back to it and repeat it")
 
 
 def _twin(layout, root):

@@ -16,6 +16,11 @@ def panels_of(*modules):
 
 def drawn(panels):
     """All words that these panels, or those of a module, show now."""
+    return " ".join(lines(panels))
+
+
+def lines(panels):
+    """The same one by one: labels, bars, buttons and names."""
     texts, layout = [], MagicMock()
     layout.panel.return_value = (layout, layout)
     for name in ("row", "column", "box", "split", "grid_flow"):
@@ -36,6 +41,7 @@ def draw(panels, layout):
             seat = MagicMock(layout=layout, find_root=getattr(panel, "find_root", None))
             seat.show = lambda *words, panel=panel, seat=seat: panel.show(seat, *words)
             panel.draw(seat, bpy.context)
+    return texts
 
 
 class Folds:

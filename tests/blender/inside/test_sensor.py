@@ -32,6 +32,7 @@ from tests.studies.bent_motion import write_bent_motion
 
 from .acting import add, refused
 from .drawing import drawn as drawn_by
+from .drawing import lines
 from .jobs import PATIENCE_S
 
 SENDER = Path(__file__).parents[2] / "sensing" / "sender.py"
@@ -87,7 +88,13 @@ def test_connect_pause_mark_and_disconnect(tmp_path):
     root = started()
     assert "mu.sensor_connect" in drawn()
     assert not bpy.ops.mu.sensor_mark.poll()
-    s = connected(root)
+    assert bpy.ops.mu.sensor_connect() == {"FINISHED"}
+    s, first = sensor.of(root), lines([sensor_panel.MU_PT_sensor])
+    assert s.watched.status == {}
+    watch(lambda: s.watched.status.get("rows", 0) > 20 and s.traces is not None)
+    for button in ("mu.sensor_disconnect", "mu.sensor_mark", "mu.sensor_sweep", "Show Twin"):
+        now = lines([sensor_panel.MU_PT_sensor])
+        assert now.index(button) == first.index(button), "a button moves while the sensor connects"
     texts = drawn()
     assert "Connected: simulated sensor" in texts, texts
     assert "Nothing lost" in texts, texts
