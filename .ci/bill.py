@@ -87,6 +87,7 @@ def _pedigree(name: str, version: str, purl: str, change: Slimmed) -> dict[str, 
     done = [f"{change.files} files, {change.bytes} bytes, left out: {', '.join(change.patterns)}"]
     done = done if change.patterns else ["compressed anew"]
     done += [f"{file} {CHANGES[file]}" for file in change.replaced]
+    done += [f"{change.shortened} libraries without what no loader reads"] if change.shortened else []
     notes = "; ".join([*done, "all others unchanged but RECORD and the build tag in WHEEL"])
     return {"ancestors": [ancestor], "notes": notes}
 

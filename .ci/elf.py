@@ -1,4 +1,4 @@
-"""What a 64-bit little-endian ELF library asks for and gives: its dynamic symbols and needed libraries."""
+"""A 64-bit little-endian ELF library: its dynamic symbols, needed libraries, and what its loader reads."""
 
 from __future__ import annotations
 
@@ -9,6 +9,11 @@ from typing import NamedTuple
 _DYNAMIC = 6  # SHT_DYNAMIC
 _DYNAMIC_SYMBOLS = 11  # SHT_DYNSYM
 _NEEDED = 1  # DT_NEEDED
+_LOAD = 1  # PT_LOAD
+_HEAD = 64
+"""Bytes of the header."""
+_PAGE = 4096
+_MAGIC = b"\x7fELF\x02\x01"
 
 
 class Section(NamedTuple):
@@ -62,9 +67,52 @@ def needed(content: bytes) -> Iterator[Needed]:
             yield Needed(_text(content, listed[section.link].offset + value), at)
 
 
+def libraries(content: bytes) -> list[str]:
+    """Names of the libraries that the loader looks for; none where the content is no library."""
+    return [library.name for library in needed(content)] if content.startswith(_MAGIC) else []
+
+
 def dynamic(content: bytes) -> list[Section]:
     """The section that the loader reads: one in a library."""
     return [section for section in _sections(content) if section.kind == _DYNAMIC]
+
+
+def loaded(content: bytes) -> bytes:
+    """The library without what no loader reads: debugging data, names of local symbols, list of sections.
+
+    Its segments stay as they are, and the spaces between them are closed by whole pages. Content that is no
+    ELF library, and a library that this makes no page shorter, come back as they are.
+    """
+    if not content.startswith(_MAGIC):
+        return content
+    (table,) = struct.unpack_from("<Q", content, 0x20)
+    size, count = struct.unpack_from("<HH", content, 0x36)
+    entries = [table + size * k for k in range(count)]
+    segments = [struct.unpack_from("<IIQQQQQQ", content, at) for at in entries]
+    kept = sorted(
+        [(0, _HEAD), (table, table + size * count), *((s[2], s[2] + s[5]) for s in segments if s[5])]
+    )
+    made, moved = bytearray(), {}
+    end = 0
+    for start, stop in kept:
+        if start > end:
+            # The loader wants a segment's place in the file and in memory alike within a page.
+            made += bytes((start - len(made)) % _PAGE)
+            end = start
+        moved[start] = len(made) - (end - start)
+        made += content[end:stop]
+        end = max(end, stop)
+    if len(made) > len(content) - _PAGE:
+        return content
+    struct.pack_into("<QQ", made, 0x20, moved[table], 0)
+    struct.pack_into("<HH", made, 0x3C, 0, 0)
+    for at, (kind, _, place, _, _, held, _, align) in zip(entries, segments, strict=True):
+        entry = at - table + moved[table]
+        if held:
+            struct.pack_into("<Q", made, entry + 8, moved[place])
+        if kind == _LOAD:
+            struct.pack_into("<Q", made, entry + 48, min(align, _PAGE))
+    return bytes(made)
 
 
 def _sections(content: bytes) -> list[Section]:

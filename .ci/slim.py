@@ -1,10 +1,12 @@
 """Wheels without what no module imports: tests, examples, manuals, headers, sources of compiled code.
 
 A slimmed wheel is made from the pinned one and no other: every file that stays is the same to the byte, but
-for the list of files (RECORD), the build tag in WHEEL, and two libraries for Linux: Warp's without CUDA
-(warp_cpu.py) and gmsh's without its window (gmsh_window.py). Nothing is left out that another extension of
-Blender's could import, since all extensions share one folder of packages; licences stay. `sbom.cdx.json`
-names the wheel that it was made from, with its SHA-256, and what was left out or replaced.
+for the list of files (RECORD), the build tag in WHEEL, and libraries for Linux: all without what no loader
+reads (elf.py), Warp's without CUDA (warp_cpu.py), gmsh's without its window (gmsh_window.py). Of modules only
+those are left out that their package does without where it is built so: cvxopt's four, which its own build
+leaves out unless asked, and Pillow's AVIF. Another extension that bundles the whole wheel gets it (BUILD);
+licences stay. `sbom.cdx.json` names the wheel that it was made from, with its SHA-256, and what was left out
+or replaced.
 
 Large files are compressed by LZMA, which takes a third less than deflate: Blender builds its Python with it
 on every system.
@@ -22,19 +24,33 @@ from fnmatch import fnmatchcase
 from pathlib import Path
 from typing import NamedTuple
 
+import elf
+
+_ASKED_FOR = ("dsdp", "fftw", "glpk", "gsl")
 PARTS = {
-    "cvxopt": (),
+    "contourpy": (),
+    # With the libraries that no other module asks for.
+    "cvxopt": (
+        *(f"cvxopt/{name}.*" for name in _ASKED_FOR),
+        *(f"cvxopt.libs/lib{name}*" for name in (*_ASKED_FOR, "gmp-")),
+    ),
     # Every compiled module has its source in Python beside it, which takes its place.
     "fonttools": tuple(f"fontTools/*.{ending}" for ending in ("c", "pyx", "pxd", "so", "pyd")),
-    "gmsh": ("gmsh-*.data/data/share/doc/*", "gmsh-*.data/data/include/*"),
-    "ipctk": (),
+    "gmsh": (
+        "gmsh-*.data/data/share/doc/*",
+        "gmsh-*.data/data/include/*",
+        "gmsh-*.data/data/lib/gmsh.jl",
+    ),
+    "ipctk": ("ipc/*.cpp", "ipc/*.hpp", "ipc/*.tpp"),
     "kiwisolver": (),
     "manifold3d": (),
     "matplotlib": ("*/tests/*", "matplotlib/mpl-data/sample_data/*"),
-    "pillow": (),
+    "pillow": ("PIL/_avif.*", "pillow.libs/libavif-*", "PIL/.dylibs/libavif.*"),
+    "pymetis": (),
+    "python_calamine": (),
     "pytetwild": (),
-    "scipy": ("*/tests/*",),
-    "warp_lang": ("warp/tests/*", "warp/examples/*"),
+    "scipy": ("*/tests/*", "*.pyx", "*.pxd"),
+    "warp_lang": ("warp/tests/*", "warp/examples/*", "warp/native/*.cpp", "warp/native/*.cu"),
 }
 """The wheels that are made anew, and what is left out of each; `*` stands for folders, too."""
 LEGAL = ("licen", "copying", "notice", "credits")
@@ -46,7 +62,8 @@ BUILD = "0slim"
 
 
 class Slimmed(NamedTuple):
-    """A wheel that was slimmed: its name, the wheel it was made from, what was left out and replaced."""
+    """A wheel that was slimmed: its name, the wheel it was made from, what was left out and replaced,
+    and how many of its libraries are without what no loader reads."""
 
     name: str
     original: str
@@ -55,6 +72,7 @@ class Slimmed(NamedTuple):
     files: int
     bytes: int
     replaced: tuple[str, ...] = ()
+    shortened: int = 0
 
 
 def slimmed_name(name: str) -> str:
@@ -68,7 +86,8 @@ def slim(
 ) -> tuple[Path, Slimmed | None]:
     """Make the slimmed wheel of a pinned one in `folder`; the wheel itself and None where it stays whole.
 
-    replaced: other content of files, by name. Equal wheels give equal bytes.
+    replaced: other content of files, by name. Equal wheels give equal bytes. Raises RuntimeError where a
+    library asks for one that is left out.
     """
     replaced = replaced or {}
     patterns = PARTS.get(wheel.name.split("-")[0].lower())
@@ -80,7 +99,8 @@ def slim(
     with zipfile.ZipFile(wheel) as source, zipfile.ZipFile(beside, "w") as target:
         left_out = [i for i in source.infolist() if _left_out(i.filename, patterns)]
         names = {i.filename for i in left_out}
-        changed = {**replaced, **_changed(source, names, replaced)}
+        shortened = _shortened(source, names, replaced)
+        changed = {**replaced, **shortened, **_changed(source, names, {**replaced, **shortened})}
         for info in source.infolist():
             if info.filename not in names:
                 content = changed.get(info.filename) or source.read(info)
@@ -89,7 +109,8 @@ def slim(
     beside.replace(made)
     digest = hashlib.sha256(wheel.read_bytes()).hexdigest()
     size = sum(i.file_size for i in left_out)
-    return made, Slimmed(made.name, wheel.name, digest, patterns, len(left_out), size, tuple(replaced))
+    told = patterns, len(left_out), size, tuple(replaced), len(shortened)
+    return made, Slimmed(made.name, wheel.name, digest, *told)
 
 
 def differences(
@@ -110,7 +131,7 @@ def differences(
         if hashlib.sha256(made.read(name)).hexdigest() != replaced[name]:
             wrong.append(f"{name} has another SHA-256 than pinned")
     for name in sorted(names & expected - set(own) - replaced.keys()):
-        if made.getinfo(name).CRC != original.getinfo(name).CRC or made.read(name) != original.read(name):
+        if made.read(name) != elf.loaded(original.read(name)):
             wrong.append(f"{name} was changed")
     return wrong
 
@@ -119,6 +140,28 @@ def _left_out(name: str, patterns: tuple[str, ...]) -> bool:
     if any(word in name.rpartition("/")[2].lower() for word in LEGAL):
         return False
     return any(fnmatchcase(name, pattern) for pattern in patterns)
+
+
+def _shortened(
+    source: zipfile.ZipFile, left_out: set[str], replaced: Mapping[str, bytes]
+) -> dict[str, bytes]:
+    """Libraries without what no loader reads, by name, where that makes them smaller.
+
+    Raises RuntimeError where one that stays asks for one that is left out.
+    """
+    gone = {name.rpartition("/")[2] for name in left_out}
+    made = {}
+    for name in source.namelist():
+        if ".so" not in name or name in left_out or name in replaced:
+            continue
+        content = source.read(name)
+        missing = sorted(gone.intersection(elf.libraries(content)))
+        if missing:
+            raise RuntimeError(f"{name} asks for {missing[0]}, which is left out (slim.py)")
+        shorter = elf.loaded(content)
+        if shorter != content:
+            made[name] = shorter
+    return made
 
 
 def _own(package: zipfile.ZipFile) -> tuple[str, str]:

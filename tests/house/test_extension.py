@@ -7,11 +7,13 @@ import importlib.util
 import json
 import re
 import shutil
+import struct
 import subprocess
 import sys
 import tomllib
 import zipfile
 from pathlib import Path
+from typing import NamedTuple
 
 import numpy as np
 import pytest
@@ -149,10 +151,11 @@ def published(tmp_path):
 
 def with_record(path, files, record):
     """A wheel of these files, by name, with its record of them."""
-    rows = [f"{name},sha256={digest(text.encode())},{len(text)}\n" for name, text in files.items()]
+    files = {name: held if isinstance(held, bytes) else held.encode() for name, held in files.items()}
+    rows = [f"{name},sha256={digest(held)},{len(held)}\n" for name, held in files.items()]
     with zipfile.ZipFile(path, "w") as stream:
-        for name, text in (files | {record: "".join(rows) + f"{record},,\n"}).items():
-            stream.writestr(name, text)
+        for name, held in (files | {record: "".join(rows) + f"{record},,\n"}).items():
+            stream.writestr(name, held)
     return path
 
 
@@ -198,6 +201,98 @@ def test_another_change_of_a_slimmed_wheel_is_refused(tmp_path, ci, published):
     published.write_bytes(published.read_bytes() + b"x")
     found = wheels.not_as_pinned(archive_of(tmp_path, {made.name: made.read_bytes()}), [pin], tmp_path)
     assert f"wheels/{made.name} has another SHA-256 than pinned" in found
+
+
+class Segment(NamedTuple):
+    """A part of a library as its loader is told of it."""
+
+    kind: int
+    flags: int
+    offset: int
+    address: int
+    physical: int
+    held: int
+    taken: int
+    align: int
+
+
+def segments(content):
+    """A library's segments, and where the list of them lies."""
+    (table,) = struct.unpack_from("<Q", content, 0x20)
+    size, count = struct.unpack_from("<HH", content, 0x36)
+    listed = [Segment(*struct.unpack_from("<IIQQQQQQ", content, table + size * k)) for k in range(count)]
+    return listed, slice(table, table + size * count)
+
+
+LOADED = """
+import importlib.util, sys
+spec = importlib.util.spec_from_file_location(*sys.argv[1:])
+module = importlib.util.module_from_spec(spec)
+spec.loader.exec_module(module)
+print(len(dir(module)))
+"""
+
+
+@pytest.mark.skipif(sys.platform != "linux", reason="ELF libraries")
+@pytest.mark.parametrize("name", ["kiwisolver._cext", "PIL._imaging", "cvxopt.base"])
+def test_a_library_without_what_no_loader_reads_has_the_same_segments_and_loads(name, tmp_path, ci):
+    elf = ci("elf")
+    file = Path(importlib.util.find_spec(name).origin)
+    published = file.read_bytes()
+    made = elf.loaded(published)
+    assert len(made) < 0.8 * len(published)
+    assert (elf.loaded(made), elf.loaded(b"no library")) == (made, b"no library")
+    blank = []
+    for content in (published, made):
+        whole, (_, table) = bytearray(content), segments(content)
+        whole[table] = bytes(table.stop - table.start)
+        whole[:64] = bytes(64)
+        blank.append(whole)
+    for before, after in zip(segments(published)[0], segments(made)[0], strict=True):
+        assert after._replace(offset=before.offset, align=before.align) == before
+        assert after.kind != 1 or (after.address - after.offset) % after.align == 0
+        held = [
+            whole[part.offset : part.offset + part.held]
+            for whole, part in zip(blank, (before, after), strict=True)
+        ]
+        assert held[0] == held[1]
+    # Beside the libraries that it asks for by a place relative to its own.
+    root = file.parents[name.count(".")]
+    for libraries in root.glob(f"{file.parent.name.lower().replace('pil', 'pillow')}.libs"):
+        (tmp_path / libraries.name).symlink_to(libraries)
+    copy = tmp_path / file.relative_to(root)
+    copy.parent.mkdir()
+    found = []
+    for content in (published, made):
+        copy.write_bytes(content)
+        done = ran([sys.executable, "-c", LOADED, name, copy])
+        assert done.returncode == 0, done.stderr
+        found.append(done.stdout)
+    assert found[0] == found[1]
+
+
+@pytest.mark.skipif(sys.platform != "linux", reason="ELF libraries")
+def test_a_slimmed_wheel_has_its_libraries_as_the_loader_reads_them(tmp_path, ci, published):
+    content = Path(importlib.util.find_spec("kiwisolver._cext").origin).read_bytes()
+    with_record(published, {**SCIPY, "scipy/linalg/_flapack.so": content}, "scipy-9.dist-info/RECORD")
+    made, change = ci("slim").slim(published, tmp_path / "slim")
+    assert change.shortened == 1
+    shorter = ci("elf").loaded(content)
+    with zipfile.ZipFile(made) as package, zipfile.ZipFile(published) as original:
+        rows = package.read("scipy-9.dist-info/RECORD").decode().splitlines()
+        assert f"scipy/linalg/_flapack.so,sha256={digest(shorter)},{len(shorter)}" in rows
+        assert ci("slim").differences(package, original) == []
+        assert ci("slim").differences(original, original)[-1] == "scipy/linalg/_flapack.so was changed"
+
+
+@pytest.mark.skipif(sys.platform != "linux", reason="ELF libraries")
+def test_a_library_that_another_asks_for_is_not_left_out(tmp_path, ci, published):
+    content = Path(importlib.util.find_spec("cvxopt.base").origin).read_bytes()
+    asked = next(name for name in ci("elf").libraries(content) if "blas" in name)
+    files = {"scipy/linalg/base.so": content, f"scipy/tests/{asked}": "a library"}
+    with_record(published, {**SCIPY, **files}, "scipy-9.dist-info/RECORD")
+    with pytest.raises(RuntimeError, match=rf"base\.so asks for {re.escape(asked)}, which is left out"):
+        ci("slim").slim(published, tmp_path / "slim")
 
 
 WARP = {
