@@ -343,7 +343,7 @@ def print_check():
     assert called(bpy.ops.mu.print_show, finding=0) == {"FINISHED"}
     yield 2.0
     seen_from(20)
-    yield from scrolled(4)
+    yield from scrolled(11)
     shot("print-check")
 
 
