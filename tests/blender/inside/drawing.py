@@ -31,7 +31,7 @@ def lines(panels):
     layout.prop.side_effect = lambda data, name, **_: name == "name" and texts.append(data.name)
     layout.template_icon.side_effect = lambda icon, scale: texts.append("a picture")
     draw(panels_of(panels) if inspect.ismodule(panels) else panels, layout)
-    return " ".join(texts)
+    return texts
 
 
 def draw(panels, layout):
@@ -41,7 +41,6 @@ def draw(panels, layout):
             seat = MagicMock(layout=layout, find_root=getattr(panel, "find_root", None))
             seat.show = lambda *words, panel=panel, seat=seat: panel.show(seat, *words)
             panel.draw(seat, bpy.context)
-    return texts
 
 
 class Folds:
