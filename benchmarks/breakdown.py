@@ -15,7 +15,7 @@ from mu_addon.design.parameters import load_preset
 from mu_addon.fem import factor, model, self_contact
 from mu_addon.fem.bending_angle import bending_angle_deg
 from mu_addon.fem.equilibrium import Equilibrium
-from mu_addon.fem.newton_settings import RESOLVED_CONTACT_NEWTON
+from mu_addon.fem.newton_settings import BODY_CONTACT_NEWTON
 from mu_addon.fem.self_contact import self_contact_of
 from mu_addon.fem.state import rest
 from mu_addon.fem.unit_materials import materials_of
@@ -84,7 +84,7 @@ def main():
     mesh = mesh_printed(unit, MeshSettings(refine=given.refine))
     body = model.Model(mesh, threads=1)
     body.self_contact = self_contact_of(unit, mesh)
-    equilibrium = Equilibrium(body, materials_of(unit, mesh), RESOLVED_CONTACT_NEWTON)
+    equilibrium = Equilibrium(body, materials_of(unit, mesh), BODY_CONTACT_NEWTON)
     print(f"{circumstances()}\n\n{len(body.free)} unknowns, {len(body.self_contact.facets)} facets\n")
     # Kernels are compiled, or read, at their first use.
     body.potential(0.0 * mesh.nodes, 0.0, equilibrium.parameters)

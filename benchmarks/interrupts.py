@@ -2,7 +2,7 @@
 
     python -m benchmarks.interrupts                            # all of them, 12 times each
     python -m benchmarks.interrupts --times 30 --seed 7 sweep
-    python -m benchmarks.interrupts --kill "place, resolved"   # kill -9 instead
+    python -m benchmarks.interrupts --kill place                   # kill -9 instead
 
 The moments are spread over the run, one in each of its equal parts. Half of the signals go to the whole
 process group, as a terminal sends them, half to the command alone; every third comes twice, and every fourth

@@ -1,4 +1,4 @@
-"""How a resolved unit's bending angle depends on its mesh: sizes of wall and struts, one by one or together.
+"""How a printed unit's bending angle depends on its mesh: sizes of wall and struts, one by one or together.
 
     python -m benchmarks.body.convergence [--sizes MERIDIAN HOOP THROUGH RINGS LAYERS] [--refine 1 ...]
         [--chambers 3] [--pressure -10 -5 5 10 20 40] [--tie-from 0]
@@ -28,7 +28,7 @@ from .tip import tip_section
 PRESSURES_KPA = (-10.0, -5.0, 5.0, 10.0, 20.0, 40.0)
 
 
-def resolved_unit(chambers=3, preset="mu-1.0x"):
+def printed_unit(chambers=3, preset="mu-1.0x"):
     """A preset with another number of chambers."""
     unit = load_preset(preset)
     return attrs.evolve(unit, chambers=attrs.evolve(unit.chambers, count=chambers))

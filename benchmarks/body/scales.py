@@ -3,7 +3,7 @@
     python -m benchmarks.body.scales FOLDER [--presets mu-0.75x mu-1.0x mu-1.5x] [--refine 0.7 1]
         [--chambers 4] [--pressure -20 -10 20 40] [--without-contact]
 
-Each row is a whole `place` of the resolved unit, every window of anchors a candidate, kept in a folder of its
+Each row is a whole `place` of the printed unit, every window of anchors a candidate, kept in a folder of its
 own below FOLDER: a run that was stopped goes on there. Seconds are of processor time; of a run that goes on,
 those since.
 """

@@ -25,7 +25,7 @@ def tip_section(mesh: Mesh, d: Dimensions, part: str = "plane") -> TipSection:
     faces, owner = boundary_faces(mesh.tets)
     corners = mesh.nodes[faces]
     on = (np.abs(corners[:, :, 2] - d.height) < 1e-9).all(axis=1)
-    if mesh.resolved:
+    if mesh.of_printed_body:
         on &= mesh.filled[owner].mean(axis=1) > 0.5
     cap = (np.hypot(corners[..., 0], corners[..., 1]) <= d.r * (1.0 + _RIM)).all(axis=1)
     on &= {"plane": np.ones_like(cap), "cap": cap, "rest": ~cap}[part]

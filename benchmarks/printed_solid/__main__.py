@@ -1,11 +1,11 @@
 """The printed solid of a unit as its own model, without homogenisation: mesh, its quality, bending angles.
 
-    python -m benchmarks.printed_solid --chambers 3 --edge 1.0 --pressure -10 -5 5 10 [--resolved]
+    python -m benchmarks.printed_solid --chambers 3 --edge 1.0 --pressure -10 -5 5 10 [--printed]
 
 Half of the solid as drawn, its inlet left out, one resin. Its surface is remeshed to triangles of one size
 (`remesh`), filled by gmsh (HXT), and mid-edge nodes are moved onto a finer surface. The angle of the tip's
 cap and that of all that lies in its plane, struts as well, are not the same. Fails where the remeshed surface
-crosses itself (two of five settings). --resolved: the same unit and resin as `mesh_printed` meshes it, too.
+crosses itself (two of five settings). --printed: the same unit and resin as `mesh_printed` meshes it, too.
 """
 
 from __future__ import annotations
@@ -185,7 +185,7 @@ def main() -> None:
     parser.add_argument("--poisson", type=float, default=0.45)
     parser.add_argument("--wall", type=float, help="Wall in mm in place of the preset's.")
     parser.add_argument("--pressure", type=float, nargs="*", default=[], metavar="kPa")
-    parser.add_argument("--resolved", action="store_true", help="Solve the resolved mesh, too.")
+    parser.add_argument("--printed", action="store_true", help="Solve the printed mesh, too.")
     options = parser.parse_args()
     unit = load_preset(options.preset)
     chambers = attrs.evolve(unit.chambers, count=options.chambers)
@@ -217,9 +217,9 @@ def main() -> None:
         f"{np.count_nonzero(folded_corners(mesh) <= 0)} folded"
     )
     meshes = {"printed solid": mesh}
-    if options.resolved:
-        meshes["resolved"] = mesh_printed(unit)
-        told(f"resolved mesh, {3 * (len(meshes['resolved'].nodes) - len(meshes['resolved'].tied))} unknowns")
+    if options.printed:
+        meshes["printed"] = mesh_printed(unit)
+        told(f"printed mesh, {3 * (len(meshes['printed'].nodes) - len(meshes['printed'].tied))} unknowns")
     for name, mesh in meshes.items():
         for pressure, read in angles(
             mesh, d, options.pressure, resin(mesh, options.modulus, options.poisson), ("cap", "plane")

@@ -1,4 +1,4 @@
-"""The resolved unit: the printed body itself as a finite-element mesh, strut by strut.
+"""The printed body as a finite-element mesh, strut by strut.
 
 `mesh_printed` meshes struts and wall separately and ties them where they meet. See
 docs/engineering/method.md.

@@ -1,4 +1,4 @@
-"""Struts of a resolved mesh as beams where they are whole: away from wall, waveguide and cuts.
+"""Struts of a printed mesh as beams where they are whole: away from wall, waveguide and cuts.
 
 A strut's mesh is swept in layers from its cell's corner to its centre. A layer clear of the parts that
 support struts becomes one beam of `fem.beams`, whose sections carry the layer's nodes. Feet, cut struts and
@@ -63,7 +63,7 @@ def without_beams(mesh: Mesh, solid: Array) -> Mesh:
 
 
 def with_beams(mesh: Mesh, d: Dimensions, layers: int, clear: Array, reach_mm: float) -> Mesh:
-    """A resolved mesh of swept struts with beams in place of the layers that are whole and far from walls.
+    """A printed mesh of swept struts with beams in place of the layers that are whole and far from walls.
 
     layers: of a strut's mesh, as in `strut_mesh`; clear (n,): distance of the struts' nodes in mm from the
     parts that support struts; reach_mm: distance below which a layer stays solid. Rotation vectors are nodes
@@ -86,7 +86,7 @@ def rotation_nodes(beams: Array, nodes: Array) -> tuple[Array, Array]:
 
 
 class Layers:
-    """The layers of the struts in a resolved mesh.
+    """The layers of the struts in a printed mesh.
 
     elements (k,): those of struts; strut, layer (k,): of each. Of each pair of a node and its strut: node,
     strut, twice its level in layers, and True if it is on the axis.

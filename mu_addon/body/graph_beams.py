@@ -30,7 +30,7 @@ _BEYOND = 0.8
 
 
 class GraphLayers:
-    """Layers of the struts in a resolved mesh of a lattice of any kind; see `with_graph_beams`.
+    """Layers of the struts in a printed mesh of a lattice of any kind; see `with_graph_beams`.
 
     elements (k,): those of struts; strut (k,): of each; inside (k, p): layer of each of p points in it.
     """
@@ -207,7 +207,7 @@ def graph_layers_of(mesh: Mesh, lattice: Lattice) -> GraphLayers:
 def with_graph_beams(
     mesh: Mesh, lattice: Lattice, layers: int, clear: Array, reach_mm: float, zones: Zones
 ) -> Mesh:
-    """A resolved mesh with beams in place of the layers of struts that are whole and far from walls.
+    """A printed mesh with beams in place of the layers of struts that are whole and far from walls.
 
     layers: at most, of a strut; fewer if a layer would be hardly longer than a rigid zone. clear (n,):
     distance of the nodes in mm from the parts that support struts; reach_mm: distance below which a layer

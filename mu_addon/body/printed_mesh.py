@@ -37,7 +37,7 @@ coarser ones it would stiffen the feet (-19.2 for -20.7 degrees at -10 kPa, refi
 
 @attrs.frozen
 class Sizes:
-    """Element sizes of a resolved mesh; how they were chosen: docs/engineering/decisions.md.
+    """Element sizes of a printed mesh; how they were chosen: docs/engineering/decisions.md.
 
     Of the wall in mm for a cell of 12.5 mm, proportional to the cell: along its meridian, and around its
     largest radius; through_wall: elements across it. Of struts rings and layers as in `strut_mesh`.

@@ -44,7 +44,7 @@ def bar_of(unit: Unit, path: Window | ArrayLike, body: Body | None = None) -> Ba
     if not is_half_diagonal(d) and is_thickening(d, bar):
         raise InputError(
             f"struts of {d.junction_diameter:.3g} mm are thickened where they meet a waveguide of "
-            f"{d.waveguide_section:.3g} mm, which the resolved model follows in body-centred lattices alone",
+            f"{d.waveguide_section:.3g} mm, which the model follows in body-centred lattices alone",
             "[lattice] kind, junction_diameter_mm",
             "make junctions as wide as the waveguide",
         )

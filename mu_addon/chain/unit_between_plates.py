@@ -15,7 +15,7 @@ from ..fem.dead_loads import nodal_masses
 from ..fem.equilibrium import Equilibrium
 from ..fem.factor import IndefiniteError
 from ..fem.model import Model
-from ..fem.newton_settings import RESOLVED_NEWTON
+from ..fem.newton_settings import BODY_NEWTON
 from ..fem.rotations import rotation, skew
 from ..fem.unit_materials import materials_of
 from ..meshing.mesh import Mesh
@@ -95,7 +95,7 @@ class PlateBody:
         supports = np.zeros((len(mesh.nodes), 3), bool)
         supports[self.tip] = True
         materials = materials_of(unit, mesh)
-        settings = attrs.evolve(RESOLVED_NEWTON, follow_snaps=False)
+        settings = attrs.evolve(BODY_NEWTON, follow_snaps=False)
         self.equilibrium = Equilibrium(Model(mesh, supports, threads=threads), materials, settings)
         self._open = Model(mesh, threads=threads)
         self.parameters = self.equilibrium.parameters

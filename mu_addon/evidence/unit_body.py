@@ -14,8 +14,8 @@ from ..arrays import Array
 from ..design.parameters import Unit
 from ..errors import InputError
 from ..fem.newton_settings import (
-    RESOLVED_CONTACT_NEWTON,
-    RESOLVED_NEWTON,
+    BODY_CONTACT_NEWTON,
+    BODY_NEWTON,
     NewtonSettings,
 )
 from ..measured.pose import Direction, X, down
@@ -32,12 +32,12 @@ if TYPE_CHECKING:
 WALL, HELD = "wall", "held"
 # A size whose path ends before the last pressure is useless: it need not be followed to its end.
 SMOOTH_CONTACT: NewtonSettings = attrs.evolve(
-    RESOLVED_CONTACT_NEWTON, min_step_MPa=1e-3, max_factorisations=20, follow_snaps=False
+    BODY_CONTACT_NEWTON, min_step_MPa=1e-3, max_factorisations=20, follow_snaps=False
 )
 # Of a unit of another design, left out where its path ends: of eight six took no step below 2 kPa and did not
 # snap, two ended at 30 and 32.5 kPa. Damped motion moved one of these by 26 mm in 93 s and did not end.
 OTHER_CONTACT: NewtonSettings = attrs.evolve(
-    RESOLVED_CONTACT_NEWTON,
+    BODY_CONTACT_NEWTON,
     min_step_MPa=2e-3,
     max_factorisations=32,
     max_iterations=60,
@@ -106,8 +106,8 @@ class Body:
         if self.self_contact:
             if self.other:
                 return OTHER_CONTACT
-            return RESOLVED_CONTACT_NEWTON if effect is None and self.drawn is None else SMOOTH_CONTACT
-        return effect.newton if effect else RESOLVED_NEWTON
+            return BODY_CONTACT_NEWTON if effect is None and self.drawn is None else SMOOTH_CONTACT
+        return effect.newton if effect else BODY_NEWTON
 
     def materials(self, mesh: Mesh) -> Materials:
         """The base model's materials on a mesh; raises InputError if the unit's wall has a law of its own."""
@@ -149,7 +149,7 @@ class UnitEffect:
     model: Callable[[Body, Mesh, float], Model] | None = None
     load: Callable[[Body, Mesh, float], Array] | None = None
     has_gravity: bool = False
-    newton: NewtonSettings = RESOLVED_NEWTON
+    newton: NewtonSettings = BODY_NEWTON
     length: int = 0
     larger: tuple[float, ...] = ()
     first: tuple[float, ...] = ()

@@ -51,7 +51,7 @@ def bending_angle_deg(mesh: Mesh, u: Array) -> float:
     """Rotation of the tip's cross-section against the fixed base, positive toward +y, in degrees.
 
     Area-weighted best-fit rotation (orthogonal Procrustes) of the end plane in the plane of bending (y, z):
-    of cap and lattice, or of a resolved unit's cap and ends of struts. Positive toward +y, to which the unit
+    of cap and lattice, or of a printed unit's cap and ends of struts. Positive toward +y, to which the unit
     bends under growing pressure; as a right-hand rotation about x it is negative. u: (n, 3) in mm. For many
     states of one mesh, `TipSection` finds the plane once.
     """
@@ -80,7 +80,7 @@ def _tip_areas(mesh: Mesh, found: tuple[Array, Array, Array] | None = None) -> t
     faces, owner, carrying = tip_faces(mesh) if found is None else found
     a, b, c = (mesh.nodes[faces[:, i]] for i in range(3))
     area = np.linalg.norm(np.cross(b - a, c - a), axis=1) / 2
-    if mesh.resolved:
+    if mesh.of_printed_body:
         # Struts end in the same plane beside the cap; what of them lies within it counts once.
         area *= mesh.filled[owner].mean(axis=1)
     weight = np.zeros(len(mesh.nodes))

@@ -117,7 +117,7 @@ def solid_volumes(mesh: Mesh) -> Array:
     Raises MeshingError as `reference_gradients`.
     """
     volumes = reference_gradients(mesh.nodes, mesh.tets).volumes
-    return volumes * mesh.filled if mesh.resolved else volumes
+    return volumes * mesh.filled if mesh.of_printed_body else volumes
 
 
 def shape_functions(barycentric: Array, order: int) -> Array:
@@ -165,7 +165,7 @@ class Reference:
     def resisting_volumes(self) -> Array:
         """Volumes (m, q) in mm3 of the quadrature points, times `Mesh.resisting`."""
         volumes = self.at.volumes
-        return np.asarray(volumes * self.mesh.resisting if self.mesh.resolved else volumes)
+        return np.asarray(volumes * self.mesh.resisting if self.mesh.of_printed_body else volumes)
 
     @cached_property
     def on_device(self) -> tuple[wp.array, wp.array]:

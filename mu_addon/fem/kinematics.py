@@ -17,7 +17,7 @@ _ON_SURFACE_MM = 1e-4
 
 
 def numbers_of(mesh: Mesh, points: Array) -> Array:
-    """Numbers (p,) of a resolved mesh's nodes at points (p, 3) in mm; raises InputError where none is."""
+    """Numbers (p,) of a printed body's nodes at points (p, 3) in mm; raises InputError where none is."""
     from scipy.spatial import cKDTree
 
     away, found = cKDTree(mesh.nodes).query(points)
@@ -40,7 +40,7 @@ def mean_gradients(mesh: Mesh, u: Array, nodes: Array) -> Array:
     place[nodes] = np.arange(len(nodes))
     rows = np.flatnonzero((place[mesh.tets] >= 0).any(axis=1))
     reference = reference_gradients(mesh.nodes, mesh.tets[rows])
-    volume = reference.volumes * mesh.filled[rows] if mesh.resolved else reference.volumes
+    volume = reference.volumes * mesh.filled[rows] if mesh.of_printed_body else reference.volumes
     weighted = np.einsum("eai,eqaj,eq->eij", u[mesh.tets[rows]], reference.gradients, volume)
     row, corner = np.nonzero(place[mesh.tets[rows]] >= 0)
     at = place[mesh.tets[rows]][row, corner]

@@ -115,7 +115,7 @@ class Model:
     "cpu" or a CUDA device of Warp. threads: on the CPU. mean_dilatation, against volumetric locking of
     walls and struts one element thick, and of nearly incompressible bodies: the part of each bulk modulus
     above POINTWISE_BULK shear moduli acts on the mean J of an element. True asks it of every law, which must
-    then split the volume off; None, of the laws that do so in a resolved mesh, and of none in another.
+    then split the volume off; None, of the laws that do so in a printed mesh, and of none in another.
 
     Attributes: volumes (m,), filled volumes of the elements in mm3; reference, elements in the undeformed
     body.
@@ -137,7 +137,7 @@ class Model:
         self.device = device
         self.threads = threads
         self.mean_dilatation = mean_dilatation
-        self._takes_means = mesh.resolved if mean_dilatation is None else mean_dilatation
+        self._takes_means = mesh.of_printed_body if mean_dilatation is None else mean_dilatation
         self.solver = "factorisation" if device == "cpu" else "conjugate gradients"
         self.load: Array | None = None
         self.obstacles: tuple[Obstacle, ...] = ()

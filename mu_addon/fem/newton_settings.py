@@ -43,16 +43,14 @@ class NewtonSettings:
         return min(self.max_step_MPa, self.max_suction_step_MPa) if suction else self.max_step_MPa
 
 
-RESOLVED_NEWTON = NewtonSettings(
-    max_step_MPa=0.0025, easy_factorisations=2, max_iterations=40, follow_snaps=True
-)
+BODY_NEWTON = NewtonSettings(max_step_MPa=0.0025, easy_factorisations=2, max_iterations=40, follow_snaps=True)
 """For a body meshed strut by strut: single struts snap long before the body does."""
 
 # Points that begin to touch change the tangent, so an old factor is soon of no use; and a body that is
 # stopped ends far from where it was predicted.
 CONTACT_NEWTON = NewtonSettings(keep_factor=0.2, max_factorisations=40, predictor_tolerance=3.0)
 
-RESOLVED_OBSTACLE_NEWTON: NewtonSettings = attrs.evolve(CONTACT_NEWTON, max_step_MPa=0.005, follow_snaps=True)
+BODY_OBSTACLE_NEWTON: NewtonSettings = attrs.evolve(CONTACT_NEWTON, max_step_MPa=0.005, follow_snaps=True)
 """For a body meshed strut by strut near an obstacle: struts snap one by one long before the body does."""
 
 # A body that closes ends far from its prediction, and steps that touch cut short are many.
@@ -65,7 +63,7 @@ SELF_CONTACT_NEWTON = NewtonSettings(
     predictor_tolerance=3.0,
 )
 
-RESOLVED_CONTACT_NEWTON: NewtonSettings = attrs.evolve(
+BODY_CONTACT_NEWTON: NewtonSettings = attrs.evolve(
     SELF_CONTACT_NEWTON, max_suction_step_MPa=0.005, follow_snaps=True
 )
 """For a body meshed strut by strut whose walls and struts touch."""

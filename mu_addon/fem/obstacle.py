@@ -64,7 +64,7 @@ class Obstacle:
     `pose` may be set between equilibria, as an obstacle that moves has it; `path`, a function of time in s,
     does so in `simulate_in_time`. Faces of the base, the cavity and mirror planes do not touch. halvings: of
     a face's sides, with quadrature points on the pieces; large faces need some to have contact near their
-    edges. faces: those of `outer_faces` that can touch, to save time. In a resolved mesh the parts of a strut
+    edges. faces: those of `outer_faces` that can touch, to save time. In a printed mesh the parts of a strut
     inside another part do not touch, and forces on tied nodes act on their masters, as in `Model`. Methods
     take displacements u (n, 3) in mm. Raises InputError.
     """

@@ -9,7 +9,7 @@ from ..arrays import Array
 from ..meshing.mesh import AXES, Mesh, boundary_faces
 from .self_intersection import with_middles
 
-# Parts filled by less are cut away: a resolved mesh keeps this much of them, so that no motion is without
+# Parts filled by less are cut away: a printed mesh keeps this much of them, so that no motion is without
 # stiffness.
 _CUT_AWAY = 0.02
 
@@ -33,7 +33,7 @@ class OuterFaces:
 def outer_faces(mesh: Mesh) -> OuterFaces:
     """The boundary faces of a mesh without those of cavity, base and mirror planes.
 
-    Of a resolved mesh they count as far as the elements behind them do: `filled` at the quadrature point that
+    Of a printed mesh they count as far as the elements behind them do: `filled` at the quadrature point that
     is nearest to a face's corner is the bare share of that third. Faces with all nodes tied lie inside the
     part they are tied to.
     """
@@ -41,7 +41,7 @@ def outer_faces(mesh: Mesh) -> OuterFaces:
     cavity = {tuple(f) for f in np.sort(mesh.cavity_corners, axis=1).tolist()}
     keep = np.array([tuple(f) not in cavity for f in np.sort(faces[:, :3], axis=1).tolist()])
     bare = np.ones((len(faces), 3))
-    if mesh.resolved:
+    if mesh.of_printed_body:
         # Each quadrature point is nearest to one corner of its element.
         corner = (mesh.tets[owner][:, None, :4] == faces[:, :3, None]).argmax(axis=2)
         bare = np.take_along_axis(mesh.filled[owner], corner, axis=1)

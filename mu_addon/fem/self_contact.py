@@ -106,7 +106,7 @@ class SelfContact:
 
     Quadratic faces count as four flat triangles each. A node of a half or quarter mesh is kept from its
     mirror image by the same energy over its area: a symmetric body touches its image only on the plane. In a
-    resolved mesh the struts have contact only from two gaps away from the wall, bar or seat that supports
+    printed mesh the struts have contact only from two gaps away from the wall, bar or seat that supports
     them: near it they may cut into it where it bends. Faces of the base have no contact, nor do facets that
     in the undeformed body are nearer than the gap to their neighbourhood, as around the axis of a cap. Facets
     with a common node are not kept apart.
@@ -139,7 +139,7 @@ class SelfContact:
             self._ipctk.BarrierPotential(reach, stiffness_MPa, True) for reach in (gap_mm, _ROOM * gap_mm)
         )
         facets = _free_facets(mesh)
-        if mesh.resolved:
+        if mesh.of_printed_body:
             facets = self._without_feet(mesh, facets)
         self.facets = self._without_slivers(facets)
         self._surface, self._nodes = self._collision_mesh(self.facets)
@@ -587,7 +587,7 @@ class SelfContact:
 
 
 def _parts(mesh: Mesh) -> Array:
-    """Number (n,) of the part of a resolved mesh that each node is of: the wall 0, struts, bar and seats."""
+    """Number (n,) of the part of a printed mesh that each node is of: the wall 0, struts, bar and seats."""
     number = pieces(mesh) + 1
     number[mesh.tets[mesh.region != LATTICE]] = 0
     return number
@@ -609,7 +609,7 @@ def _free_facets(mesh: Mesh) -> Array:
 
 
 def self_contact_of(unit: Unit, mesh: Mesh, friction: float = 0.0) -> SelfContact:
-    """Self-contact of a resolved mesh's walls and struts, with friction between them. Raises InputError."""
+    """Self-contact of a printed body's walls and struts, with friction between them. Raises InputError."""
     return SelfContact(mesh, *_barrier_of(unit), friction)
 
 

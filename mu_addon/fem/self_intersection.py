@@ -96,7 +96,7 @@ class _Boundary:
         for axis in mesh.symmetry:
             whole = mirror(whole, axis)
         faces, owner = boundary_faces(whole.tets)
-        if whole.resolved:
+        if whole.of_printed_body:
             # Struts reach into the wall as drawn; their parts outside it are surface.
             outside = (whole.filled[owner] == 1.0).all(axis=1)
             faces, owner = faces[outside], owner[outside]
@@ -110,7 +110,7 @@ class _Boundary:
         self._inner, self._own = np.tile(inner, repeats), np.tile(own, repeats)
         self._rest = whole.nodes
         # Where a strut meets the wall their surfaces cut each other as drawn.
-        self._of_strut = np.tile(whole.resolved & (whole.region[owner] == LATTICE), repeats)
+        self._of_strut = np.tile(whole.of_printed_body & (whole.region[owner] == LATTICE), repeats)
 
     def crossings(self, u: Array) -> tuple[Crossing, ...]:
         """See the module's `crossings`."""

@@ -43,7 +43,7 @@ class Sensitivity:
     def between(self, first: Mesh, second: Mesh) -> float:
         """Difference of the number between two meshes of the same elements, to first order."""
         found = float(np.vdot(self.nodes, first.nodes - second.nodes))
-        if first.resolved:
+        if first.of_printed_body:
             found += float(np.vdot(self.filled, first.filled - second.filled))
             found += float(np.vdot(self.tied_weights, first.tied_weights - second.tied_weights))
         return found

@@ -172,14 +172,14 @@ class PeakStretch:
 def peak_stretch(mesh: Mesh, u: Array, region: int) -> PeakStretch:
     """The largest principal stretch of a region under displacements u (n, 3) in mm.
 
-    Points of a resolved mesh's struts that are less than half filled do not count.
+    Points of a printed body's struts that are less than half filled do not count.
     """
     elements = np.flatnonzero(mesh.region == region)
     F, volumes = deformation_gradients(mesh, u, elements)
     if len(mesh.beams):
         F = of_sections(mesh, u, F, elements, np.full(len(elements), _INCOMPRESSIBLE))
     largest = stretches(F)[..., 2]
-    if mesh.resolved:
+    if mesh.of_printed_body:
         share = mesh.filled[elements]
         volumes = np.where(share < 0.5, 0.0, volumes * share)
         largest = np.where(share < 0.5, 0.0, largest)
@@ -203,7 +203,7 @@ class NodalMean:
     """Values at the quadrature points of some elements (e,) of a mesh, averaged at the nodes.
 
     They are extrapolated linearly from the points to an element's nodes (its mean where it has one point) and
-    averaged over the elements around a node by volume; in a resolved mesh by filled volume.
+    averaged over the elements around a node by volume; in a printed mesh by filled volume.
     """
 
     def __init__(self, mesh: Mesh, elements: Array, reference: ReferenceGradients | None = None) -> None:
@@ -218,7 +218,7 @@ class NodalMean:
             volumes = reference_gradients(mesh.nodes, tets).volumes.sum(axis=1)
         else:
             volumes = reference.volumes[elements].sum(axis=1)
-        if mesh.resolved:
+        if mesh.of_printed_body:
             # Cut parts follow their neighbours: they count only without others.
             volumes *= np.maximum(mesh.filled[elements].mean(axis=1), _CUT_AWAY)
         self.nodes, place = np.unique(tets, return_inverse=True)

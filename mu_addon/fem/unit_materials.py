@@ -45,7 +45,7 @@ def materials_of(unit: Unit, mesh: Mesh) -> Materials:
 
 
 def _skin_stiffening(unit: Unit, mesh: Mesh) -> Array:
-    """Modulus (m,) of each element of a resolved mesh over the core's, by the skin's share of its volume."""
+    """Modulus (m,) of each element of a printed mesh over the core's, by the skin's share of its volume."""
     p, d = unit.print, unit.printed
     walls, _ = d.wall_at(mesh.nodes[mesh.tets[:, :4], 2].mean(axis=1))
     found = skin_stiffening(walls, p.skin_depth_mm, p.skin_factor)

@@ -27,7 +27,7 @@ from ..fem.bending_angle import TipSection
 from ..fem.equilibrium import Equilibrium
 from ..fem.model import Model
 from ..fem.moved_nodes import relocated
-from ..fem.newton_settings import RESOLVED_NEWTON, NewtonSettings
+from ..fem.newton_settings import BODY_NEWTON, NewtonSettings
 from ..fem.state import State, rest
 from ..fem.trajectory import Trajectory
 from ..files import write_json
@@ -41,7 +41,7 @@ from .requests import ASKED, BENT, CELLS, LEVELS, REQUEST
 RUNGS = 4
 """Number of pressures solved between 0 and the largest."""
 NEWTON: NewtonSettings = attrs.evolve(
-    RESOLVED_NEWTON, tolerance=1e-6, max_step_MPa=0.02, easy_factorisations=12, follow_snaps=False
+    BODY_NEWTON, tolerance=1e-6, max_step_MPa=0.02, easy_factorisations=12, follow_snaps=False
 )
 LOOK_S = 0.05
 """Interval in s at which a new request is looked for."""

@@ -70,7 +70,7 @@ class Mesh:
     in_beams: Array = attrs.field(factory=lambda: np.zeros((0, 0)), converter=float64)
 
     @property
-    def resolved(self) -> bool:
+    def of_printed_body(self) -> bool:
         """True if the mesh is of a printed body, strut by strut, in parts that overlap."""
         return self.filled.size > 0
 
@@ -125,7 +125,7 @@ class Mesh:
         """SHA-256 of every array and the symmetry, equal only for identical meshes."""
         digest = hashlib.sha256(repr(self.symmetry).encode())
         parts = [self.nodes, self.tets, self.region, self.cavity, self.base, self.tip]
-        if self.resolved:
+        if self.of_printed_body:
             parts += [self.filled, self.tied, self.tied_to, self.tied_weights]
         if len(self.beams):
             parts += [self.beams, self.flexible, self.beam_of, self.carried, self.carriers, self.shares]

@@ -23,7 +23,7 @@ from ..errors import InputError, MeshingError
 from ..fem.materials import Materials
 from ..fem.model import Model
 from ..fem.moved_nodes import relocated
-from ..fem.newton_settings import RESOLVED_CONTACT_NEWTON, RESOLVED_NEWTON, NewtonSettings
+from ..fem.newton_settings import BODY_CONTACT_NEWTON, BODY_NEWTON, NewtonSettings
 from ..fem.self_contact import relocated_contact, self_contact_of
 from ..fem.unit_materials import materials_of
 from ..meshing.mesh import Mesh
@@ -97,7 +97,7 @@ class UnitBody:
 
     @property
     def _newton(self) -> NewtonSettings:
-        return RESOLVED_CONTACT_NEWTON if self.mechanics.self_contact else RESOLVED_NEWTON
+        return BODY_CONTACT_NEWTON if self.mechanics.self_contact else BODY_NEWTON
 
     def moved(self, unit: Unit) -> Structure:
         """Another unit on this one's mesh, morphed; it shares this one's buffers (`relocated`).

@@ -144,7 +144,7 @@ def _behind(bodies: Sequence[RigidBody]) -> list[Part]:
 def region_skin(mesh: Mesh, region: int) -> NDArray[np.int64]:
     """Outward triangles (f, 3) on the boundary of a region of a mesh, four for a face with mid nodes.
 
-    Struts of a resolved mesh end where they are tied: their parts within the wall are left out.
+    Struts of a printed mesh end where they are tied: their parts within the wall are left out.
     """
     triangles = skin(mesh.tets[mesh.region == region])
     return triangles[~np.isin(triangles, mesh.tied).all(axis=1)]

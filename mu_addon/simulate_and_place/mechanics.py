@@ -14,9 +14,9 @@ from ..design.parameters import Unit, Waveguide
 from ..design.rigid_body import RigidBody, mirrored, to_obj
 from ..fem.device import require_device
 from ..fem.newton_settings import (
-    RESOLVED_CONTACT_NEWTON,
-    RESOLVED_NEWTON,
-    RESOLVED_OBSTACLE_NEWTON,
+    BODY_CONTACT_NEWTON,
+    BODY_NEWTON,
+    BODY_OBSTACLE_NEWTON,
     NewtonSettings,
 )
 from ..fem.protocol import Protocol
@@ -81,8 +81,8 @@ class Mechanics:
     def newton(self) -> NewtonSettings:
         """Settings of Newton's method for this unit."""
         if self.self_contact:
-            return RESOLVED_CONTACT_NEWTON
-        return RESOLVED_OBSTACLE_NEWTON if self.in_time else RESOLVED_NEWTON
+            return BODY_CONTACT_NEWTON
+        return BODY_OBSTACLE_NEWTON if self.in_time else BODY_NEWTON
 
     @property
     def in_time(self) -> bool:

@@ -256,7 +256,7 @@ class Grip(Study):
         tell: Tell,
     ) -> grasp.Grasp:
         """The grasp of a cube, phase by phase."""
-        from ..fem.newton_settings import RESOLVED_CONTACT_NEWTON, RESOLVED_OBSTACLE_NEWTON
+        from ..fem.newton_settings import BODY_CONTACT_NEWTON, BODY_OBSTACLE_NEWTON
         from ..fem.self_contact import self_contact_of
 
         return grasp.grasp(
@@ -268,7 +268,7 @@ class Grip(Study):
             contact,
             step_s,
             on_instant=tell,
-            newton=RESOLVED_CONTACT_NEWTON if self_contact else RESOLVED_OBSTACLE_NEWTON,
+            newton=BODY_CONTACT_NEWTON if self_contact else BODY_OBSTACLE_NEWTON,
             self_contact=self_contact_of(fingers.unit, mesh) if self_contact else None,
         )
 

@@ -1,4 +1,4 @@
-"""Struts as beams in a resolved mesh: what becomes one, what stays solid, and what both give."""
+"""Struts as beams in a printed mesh: what becomes one, what stays solid, and what both give."""
 
 import attrs
 import numpy as np

@@ -10,7 +10,7 @@ from mu_addon.design import load_preset
 from mu_addon.design.anchors import anchor_points, windows
 from mu_addon.design.wall_material import Wall
 from mu_addon.fem.model import Model
-from mu_addon.fem.newton_settings import RESOLVED_OBSTACLE_NEWTON
+from mu_addon.fem.newton_settings import BODY_OBSTACLE_NEWTON
 from mu_addon.fem.obstacle import Obstacle
 from mu_addon.fem.rigid import Plane
 from mu_addon.fem.unit_materials import materials_of
@@ -41,7 +41,7 @@ def candidates(mesh, unit=SMALL, beside=False):
         return found
 
     paths = (ANCHORS[list(ALONG_ALL.indices)],)
-    settings = attrs.evolve(RESOLVED_OBSTACLE_NEWTON, tolerance=1e-8)
+    settings = attrs.evolve(BODY_OBSTACLE_NEWTON, tolerance=1e-8)
     return PrintedWaveguides(unit, mesh, paths, ANCHORS, lambda own: materials_of(unit, own), model, settings)
 
 

@@ -1,4 +1,4 @@
-"""The resolved unit against rigid bodies: what can be touched, and what it gives back."""
+"""The printed unit against rigid bodies: what can be touched, and what it gives back."""
 
 import attrs
 import numpy as np

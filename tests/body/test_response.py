@@ -13,7 +13,7 @@ from mu_addon.design.anchors import anchor_points
 from mu_addon.fem.equilibrium import Equilibrium
 from mu_addon.fem.kinematics import probe
 from mu_addon.fem.model import Model
-from mu_addon.fem.newton_settings import RESOLVED_NEWTON
+from mu_addon.fem.newton_settings import BODY_NEWTON
 from mu_addon.fem.trajectory import simulate, whole_body
 from mu_addon.fem.unit_materials import materials_of
 from mu_addon.meshing.settings import MeshSettings
@@ -65,7 +65,7 @@ def test_slopes_are_those_of_the_bar_s_deformation():
 
 
 @pytest.mark.nightly(
-    "tests/placement/test_resolved_influence.py::test_a_part_made_stiffer_moves_the_points_as_the_map_says"
+    "tests/placement/test_printed_influence.py::test_a_part_made_stiffer_moves_the_points_as_the_map_says"
 )
 def test_it_predicts_what_a_printed_waveguide_does():
     """A bent path off the mirror plane of three chambers at 1 kPa, against the full solution with it."""
@@ -73,7 +73,7 @@ def test_it_predicts_what_a_printed_waveguide_does():
     unit = attrs.evolve(unit, chambers=attrs.evolve(unit.chambers, count=3))
     anchors, graph = anchor_points(unit), lattice_graph(unit.printed)
     half = mesh_printed(unit, MeshSettings(refine=0.6))
-    solver = Equilibrium(Model(half), materials_of(unit, half), RESOLVED_NEWTON)
+    solver = Equilibrium(Model(half), materials_of(unit, half), BODY_NEWTON)
     mesh, trajectory = whole_body(half, simulate(solver, np.arange(2.0), np.array([0.0, 1.0])))
     chain = (2, 11, 24, 31)
     found = bar_response(
@@ -88,7 +88,7 @@ def test_it_predicts_what_a_printed_waveguide_does():
         anchors,
         lambda m: materials_of(unit, m),
         Model,
-        RESOLVED_NEWTON,
+        BODY_NEWTON,
     )
     solved = np.subtract(*candidates.points([*candidates.states(0, [state]), state]))
     assert np.linalg.norm(predicted[0] - solved) < 0.2 * np.linalg.norm(solved)

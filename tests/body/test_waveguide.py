@@ -1,4 +1,4 @@
-"""A printed waveguide in the resolved mesh: its volume, its ties and what it does to a motion."""
+"""A printed waveguide in the printed mesh: its volume, its ties and what it does to a motion."""
 
 import attrs
 import numpy as np
@@ -20,7 +20,7 @@ from mu_addon.errors import InputError
 from mu_addon.fem.carried_nodes import following
 from mu_addon.fem.equilibrium import Equilibrium
 from mu_addon.fem.model import Model
-from mu_addon.fem.newton_settings import RESOLVED_NEWTON
+from mu_addon.fem.newton_settings import BODY_NEWTON
 from mu_addon.fem.self_contact import SelfContact
 from mu_addon.fem.state import State
 from mu_addon.fem.unit_materials import materials_of
@@ -170,10 +170,10 @@ def test_a_candidate_is_found_from_model_a_s_state_as_along_its_own_path(mesh):
     def materials(m):
         return materials_of(SMALL, m)
 
-    still = Equilibrium(Model(mesh), materials(mesh), RESOLVED_NEWTON)
+    still = Equilibrium(Model(mesh), materials(mesh), BODY_NEWTON)
     state = still.reach(-0.004, [still.at_zero_pressure()])
     anchors = anchor_points(SMALL)
-    candidates = PrintedWaveguides(SMALL, mesh, (anchors,), anchors, materials, Model, RESOLVED_NEWTON)
+    candidates = PrintedWaveguides(SMALL, mesh, (anchors,), anchors, materials, Model, BODY_NEWTON)
     moved = candidates.points(candidates.states(0, [state]))[0]
     alone = candidates.alone(0, np.array([-0.004]))[0]
     assert np.abs(moved - alone).max() < 1e-6
@@ -189,7 +189,7 @@ def test_a_start_far_from_rest_inverts_nothing_once_its_struts_give_way(mesh, se
     u[:, 2] = -0.1 * (mesh.nodes[:, 2] - mesh.nodes[mesh.base[0], 2])
     u[mesh.beams[:, 1::2]] = 0.0
     following(mesh, u)
-    equilibrium = Equilibrium(Model(sensed), materials_of(SMALL, sensed), RESOLVED_NEWTON)
+    equilibrium = Equilibrium(Model(sensed), materials_of(SMALL, sensed), BODY_NEWTON)
     least = equilibrium.model.smallest_jacobian
     start = started(mesh, sensed, anchor_points(SMALL), u)
     found = eased(equilibrium, start, u)
@@ -210,7 +210,7 @@ def test_a_waveguide_does_not_touch_what_stands_on_it(mesh, sensed):
 def test_the_unit_s_own_nodes_are_seen_where_they_would_be_without_thickening(thin):
     anchors = anchor_points(THIN)
     candidates = PrintedWaveguides(
-        THIN, thin, (anchors,), anchors, lambda m: materials_of(THIN, m), Model, RESOLVED_NEWTON
+        THIN, thin, (anchors,), anchors, lambda m: materials_of(THIN, m), Model, BODY_NEWTON
     )
     sensed = with_waveguide(thin, bar_of(THIN, anchors), THIN)
     gradient = np.array([[0.02, 0.0, 0.0], [0.0, -0.01, 0.03], [0.0, 0.02, 0.01]])

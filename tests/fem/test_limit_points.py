@@ -11,7 +11,7 @@ from mu_addon.errors import ConvergenceError
 from mu_addon.fem import time_stepping
 from mu_addon.fem.equilibrium import Equilibrium
 from mu_addon.fem.model import Model
-from mu_addon.fem.newton_settings import RESOLVED_OBSTACLE_NEWTON, NewtonSettings
+from mu_addon.fem.newton_settings import BODY_OBSTACLE_NEWTON, NewtonSettings
 from mu_addon.fem.obstacle import Obstacle
 from mu_addon.fem.rigid import Plane, Pose
 from mu_addon.fem.state import rest
@@ -128,7 +128,7 @@ def test_a_motion_in_time_goes_on_beyond_a_limit_point(monkeypatch):
     model.obstacles = (prop,)
     model.load = np.zeros_like(mesh.nodes)
     model.load[crown(mesh), 1] = -0.01
-    body = Equilibrium(model, bodies.uniform(mesh, 1.0, 0.3), RESOLVED_OBSTACLE_NEWTON)
+    body = Equilibrium(model, bodies.uniform(mesh, 1.0, 0.3), BODY_OBSTACLE_NEWTON)
     times, none = np.array([0.0, 1.0, 2.0]), np.zeros(3)
     before, _, after = simulate_in_time(body, times, none).states
     assert before.snapped_mm == 0.0

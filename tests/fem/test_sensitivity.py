@@ -71,7 +71,7 @@ def work_of_beams(mesh, u, v, made):
 def test_it_is_the_derivative_by_places_shares_ties_and_stiffness(make):
     mesh = make()
     model, random = Model(mesh, threads=1), np.random.default_rng(1)
-    small = 0.05 * np.cbrt(model.volumes.min() / model.volumes.mean()) if mesh.resolved else 0.05
+    small = 0.05 * np.cbrt(model.volumes.min() / model.volumes.mean()) if mesh.of_printed_body else 0.05
     u, v = (np.zeros_like(mesh.nodes) for _ in range(2))
     u.ravel()[model.free] = small * random.standard_normal(len(model.free))
     v.ravel()[model.free] = random.standard_normal(len(model.free))
@@ -82,7 +82,7 @@ def test_it_is_the_derivative_by_places_shares_ties_and_stiffness(make):
     way = random.standard_normal(mesh.nodes.shape)
     way[plane, 0] = 0.0
     changes = {"nodes": way}
-    if mesh.resolved:
+    if mesh.of_printed_body:
         changes |= {
             name: random.standard_normal(getattr(mesh, name).shape) for name in ("filled", "tied_weights")
         }

@@ -78,8 +78,8 @@ def three_chambers(folder):
 
 def test_a_protocol_that_bursts_the_unit_keeps_the_states_before(tmp_path, monkeypatch):
     # To find the limit point itself takes half a minute; tests/fem/test_limit_points.py does.
-    soon = attrs.evolve(mechanics.RESOLVED_NEWTON, follow_snaps=False, min_step_MPa=2e-3)
-    monkeypatch.setattr(mechanics, "RESOLVED_NEWTON", soon)
+    soon = attrs.evolve(mechanics.BODY_NEWTON, follow_snaps=False, min_step_MPa=2e-3)
+    monkeypatch.setattr(mechanics, "BODY_NEWTON", soon)
     file, unit = tmp_path / "burst.csv", three_chambers(tmp_path)
     file.write_text("time_s,pressure_kPa\n0,0\n1,60\n")
     out = tmp_path / "out"

@@ -122,7 +122,7 @@ def test_portrait_is_opaque_white_around_the_unit():
     assert (image[..., :3] < 230).any(axis=2).mean() > 0.5
 
 
-def test_struts_of_a_resolved_unit_are_drawn_up_to_their_wall():
+def test_struts_of_a_printed_unit_are_drawn_up_to_their_wall():
     """No triangle of a strut lies within the wall by all its nodes, and none of those outside is missing."""
     unit = load_preset("mu-1.0x")
     unit = attrs.evolve(unit, chambers=attrs.evolve(unit.chambers, count=3))

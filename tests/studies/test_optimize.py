@@ -161,8 +161,8 @@ def test_a_design_that_breaks_a_rule_is_a_row_and_not_the_end():
 
 def test_a_unit_that_does_not_bear_its_pressure_is_an_answer(monkeypatch):
     # To find the limit point itself takes half a minute.
-    soon = attrs.evolve(unit_body.RESOLVED_NEWTON, follow_snaps=False, min_step_MPa=2e-3)
-    monkeypatch.setattr(unit_body, "RESOLVED_NEWTON", soon)
+    soon = attrs.evolve(unit_body.BODY_NEWTON, follow_snaps=False, min_step_MPa=2e-3)
+    monkeypatch.setattr(unit_body, "BODY_NEWTON", soon)
     design = design_of(TEXT.replace("pressure_kPa = 2.5", "pressure_kPa = 60"))
     unit = SMALL.evolve(membrane_modulus_kPa=50.0)
     found = evaluate(unit, design.targets, design.freedoms, mechanics_of(design, None)[0])

@@ -1,4 +1,4 @@
-"""The adjoint map of a resolved unit, whose parts are tied, against solutions with some of it stiffened."""
+"""The adjoint map of a printed unit, whose parts are tied, against solutions with some of it stiffened."""
 
 import attrs
 import numpy as np
@@ -11,7 +11,7 @@ from mu_addon.fem.equilibrium import Equilibrium
 from mu_addon.fem.kinematics import probe
 from mu_addon.fem.materials import Materials
 from mu_addon.fem.model import Model
-from mu_addon.fem.newton_settings import RESOLVED_NEWTON
+from mu_addon.fem.newton_settings import BODY_NEWTON
 from mu_addon.fem.trajectory import simulate, whole_body
 from mu_addon.meshing.mesh import LATTICE, mirror
 from mu_addon.meshing.settings import MeshSettings
@@ -20,7 +20,7 @@ from mu_addon.placement.sensitivity_map import influence_map, loaded, parities
 UNIT = load_preset("mu-1.0x")
 UNIT = attrs.evolve(UNIT, chambers=attrs.evolve(UNIT.chambers, count=3))
 POINTS = anchor_points(UNIT)
-TIGHT = attrs.evolve(RESOLVED_NEWTON, tolerance=1e-12)
+TIGHT = attrs.evolve(BODY_NEWTON, tolerance=1e-12)
 
 
 def materials(factor):
