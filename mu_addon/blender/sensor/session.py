@@ -91,6 +91,7 @@ class Session:
     trouble: str = ""
     """Reason why the calibration cannot read this stream."""
     _shown: tuple[Any, ...] = ()
+    _stood: tuple[bool, bool] = (False, False)
     read_at: float = 0.0
 
     @property
@@ -114,10 +115,9 @@ class Session:
         return self.watched.columns[len(FIXED) :]
 
     def update(self, calibration: Any, seconds: float) -> bool:
-        """Process new samples; return True if there is a new status. Never waits."""
-        was_running = self.running
+        """Process new samples; return True if there is a new status, or samples begin or end. Never waits."""
         self.child.poll()
-        news = self.watched.look() or was_running != self.running
+        news = self.watched.look()
         if self.channels and (self.traces is None or self._shown != (self.channels, calibration)):
             self._shown = self.channels, calibration
             self.traces = Traces(len(self.channels) + len(ANGLES), seconds, BINS)
@@ -127,7 +127,9 @@ class Session:
         if len(rows) and self.traces is not None:
             values = rows[:, len(FIXED) :]
             self.traces.add(rows[:, 0], np.column_stack([values, self._angles(values, calibration)]))
-        return news
+        # Buttons that need samples are greyed as soon as none come.
+        stood, self._stood = self._stood, (self.running, self.fresh)
+        return news or stood != self._stood
 
     def _angles(self, values: Any, calibration: Any) -> Any:
         """Angle and its band (n, 3) in degrees, nan without a calibration that reads these channels."""

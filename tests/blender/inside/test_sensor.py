@@ -11,6 +11,7 @@ import signal
 import time
 import tty
 from pathlib import Path
+from types import SimpleNamespace
 from unittest.mock import MagicMock
 
 import bpy
@@ -24,7 +25,7 @@ from mu_addon.blender.sensor import plot as sensor_plot
 from mu_addon.blender.sensor import session as sensor_session
 from mu_addon.blender.sensor import state as sensor
 from mu_addon.blender.sensor import twin
-from mu_addon.blender.sensor.session import Guide
+from mu_addon.blender.sensor.session import RUNNING, Guide, Session
 from mu_addon.blender.unit import object as unit_object
 from mu_addon.sensing.calibration import CalibrationSweep, calibrate, write_calibration
 from mu_addon.sensing.recording import read_recording
@@ -134,6 +135,15 @@ def test_unregister_ends_the_session():
     assert not bpy.app.timers.is_registered(sensor._poll.function)
     mu_addon.register()
     assert sensor.of(add()) is None
+
+
+def test_panels_are_drawn_anew_when_samples_begin_and_when_they_end():
+    child = SimpleNamespace(state=RUNNING, poll=lambda: None)
+    watched = SimpleNamespace(starved_s=0.2, look=lambda: False, columns=(), fresh=lambda: ())
+    session = Session(child, watched)
+    assert [session.update(None, 10.0) for _ in range(2)] == [True, False]
+    watched.starved_s = 1.5
+    assert [session.update(None, 10.0) for _ in range(2)] == [True, False]
 
 
 def test_a_killed_reader_and_a_folder_that_is_gone(tmp_path, monkeypatch):
