@@ -88,6 +88,7 @@ def _two_runs():
     bpy.ops.wm.save_as_mainfile(filepath=str(FOLDER / "runs.blend"))
     assert bpy.ops.mu.add(preset="mu-1.0x") == {"FINISHED"}
     unit = bpy.context.view_layer.objects.active
+    unit.mu_unit.study.refine = 0.5
     for wall, command in ((1.0, "simulate"), (0.9, "place")):
         unit.mu_unit.chambers.wall_mm, unit.mu_unit.study.command = wall, command
         assert bpy.ops.mu.simulate() == {"FINISHED"}

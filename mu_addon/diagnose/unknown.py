@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import itertools
 import math
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -13,6 +13,7 @@ import numpy as np
 
 from ..arrays import Array
 from ..design.parameters import Unit
+from ..design.printing.finding import counted
 from ..design.quantity import described
 from ..errors import InputError
 from ..evidence.diagnosis import noise_of
@@ -154,8 +155,9 @@ def unknown_of(path: Path, unit: Unit) -> Unknown:
 class Shape:
     """Values of the unknown parameters, by name, with all else fitted.
 
-    simulated: the unit itself was, else its response is the surface's. misfit: chi squared. predicted: mean
-    of the first channel by experiment, in its unit, its zero included. ends: parameters at a bound.
+    simulated: the unit itself was, else its response is the surface's. fails: its simulation ends before the
+    readings do. misfit: chi squared. predicted: mean of the first channel by experiment, in its unit, its
+    zero included. ends: parameters at a bound.
     """
 
     values: dict[str, float]
@@ -165,6 +167,7 @@ class Shape:
     predicted: dict[str, float]
     ends: tuple[str, ...]
     simulated: bool
+    fails: bool = False
 
 
 @attrs.frozen(eq=False)
@@ -185,8 +188,13 @@ class Shapes:
     channel: str
 
     def words(self) -> str:
-        """A sentence on what fits best."""
-        best = min((*self.fitted, *self.simulated), key=lambda s: s.misfit)
+        """A sentence on what fits best of the shapes whose simulation does not fail."""
+        best = min((*self.fitted, *self.simulated), key=lambda s: (s.fails, s.misfit))
+        failing = sum(s.fails and s.misfit < best.misfit for s in self.fitted)
+        better = (
+            f"; {counted(failing, 'shape that fits', 'shapes that fit')} better found no equilibrium at some "
+            "pressure when simulated"
+        )
         unit = self.channel.rpartition("_")[2]
         shape = ", ".join(
             f"{n.replace('_', ' ')} {v:.3g} ({low:.3g} to {high:.3g})"
@@ -199,6 +207,8 @@ class Shapes:
             f"{best.modulus:.3g}{ends}; "
             f"chi squared {best.misfit:.3g} is left of {self.readings} readings; "
             f"the surface between {len(self.simulated)} units is off by {self.error:.2g} {unit}"
+            + better
+            * bool(failing)
         )
 
     def as_json(self) -> dict[str, Any]:
@@ -208,9 +218,18 @@ class Shapes:
     def table(self) -> tuple[list[str], list[tuple[Any, ...]]]:
         """Columns and rows, a row a shape, what is fitted before what is simulated."""
         names, experiments = list(self.fitted[0].values), list(self.fitted[0].predicted)
-        head = ["of", *names, "modulus_factor", "zero", "misfit", "at_a_bound", *experiments]
+        head = ["of", *names, "modulus_factor", "zero", "misfit", "at_a_bound", "fails", *experiments]
         rows = [
-            (of, *s.values.values(), s.modulus, s.zero, s.misfit, " ".join(s.ends), *s.predicted.values())
+            (
+                of,
+                *s.values.values(),
+                s.modulus,
+                s.zero,
+                s.misfit,
+                " ".join(s.ends),
+                "yes" if s.fails else "",
+                *s.predicted.values(),
+            )
             for of, every in (("fit", self.fitted), ("simulation", self.simulated))
             for s in every
         ]
@@ -237,6 +256,9 @@ def shapes(
     channel = measured.series[0].channel
     zero = zero_of(channel)
 
+    known = set.intersection(*({tuple(place) for place in s.at.tolist()} for s in surfaces))
+    failed = set(designs.at) - known
+
     def shape(fit: Fit, simulated: bool) -> Shape:
         values = {n: float(fit.values[n]) for n in names}
         free = [p for p in fitter.curved if p.name in fit.keys and p.name in (*names, MODULUS.name)]
@@ -248,7 +270,8 @@ def shapes(
             first.setdefault(experiment.name, float(np.nanmean(found)))
         ends = tuple(p.name for p in free if _at_an_end(p, fit.values[p.name]))
         modulus, offset = (float(fit.values.get(n, null)) for n, null in ((MODULUS.name, 1.0), (zero, 0.0)))
-        return Shape(values, modulus, offset, fit.chi2, first, ends, simulated)
+        fails = _proposed(unknown, values) in failed
+        return Shape(values, modulus, offset, fit.chi2, first, ends, simulated, fails)
 
     starts: list[dict[str, float]] = [{}]
     corners = itertools.product(*((p.low, p.high) for p in smooth[:CORNERS]))
@@ -258,8 +281,7 @@ def shapes(
         fixed = {n: float(v) for (n, _), v in zip(whole, values, strict=True)}
         fits.append(min((fitter.fit((), start, fixed) for start in starts), key=lambda f: f.chi2))
     fits.sort(key=lambda f: f.chi2)
-    known = sorted({place for s in surfaces for place in map(tuple, s.at.tolist())})
-    solved = [shape(fitter.fit((), None, dict(zip(names, place, strict=True))), True) for place in known]
+    solved = [shape(fitter.fit((), None, dict(zip(names, at, strict=True))), True) for at in sorted(known)]
     free = fitter.fit((), fits[0].values)
     return Shapes(
         tuple(shape(f, False) for f in fits),
@@ -275,6 +297,14 @@ def _at_an_end(p: Parameter, value: float) -> bool:
     return min(abs(value - p.low), abs(value - p.high)) < 1e-3 * (p.high - p.low)
 
 
+def _proposed(unknown: Unknown, values: Mapping[str, float]) -> tuple[float, ...]:
+    """Values of a fit as the shape is simulated: lengths to `DIGITS`."""
+    return tuple(
+        v if f.discrete else float(f"{v:.{DIGITS}g}")
+        for f, v in zip(unknown.freedoms, values.values(), strict=True)
+    )
+
+
 def _error(surface: Surface) -> float:
     """Root mean square over designs left out, of the first channel, at the pressure where it is largest."""
     return float(np.sqrt(np.nanmean(surface.errors[:, 0] ** 2, axis=0)).max())
@@ -282,13 +312,10 @@ def _error(surface: Surface) -> float:
 
 def leading(found: Shapes, unknown: Unknown, designs: Designs, unit: Unit) -> Designs | None:
     """The designs with those that fit best, to be simulated; None where they are there or not allowed."""
-    at: list[list[float]] = []
+    at: list[tuple[float, ...]] = []
     units: list[Unit] = []
     for s in found.fitted[:LEADING]:
-        values = [
-            float(f"{v:.{DIGITS}g}") if not f.discrete else v
-            for f, v in zip(unknown.freedoms, s.values.values(), strict=True)
-        ]
+        values = _proposed(unknown, s.values)
         try:
             drawn = unknown.drawn(unit, values)
         except InputError:

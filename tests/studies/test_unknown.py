@@ -103,6 +103,29 @@ def test_a_shape_that_nobody_measured_is_found_and_no_cause_named(tmp_path, clos
     assert "of the unknown parameters" in summary["remarks"][-1]
 
 
+def test_a_shape_that_finds_no_equilibrium_is_not_told_as_what_fits_best(tmp_path, closed_form, monkeypatch):
+    reached = unit_fem.run
+
+    def snaps(case, cache=None):
+        # Walls thinner than those of the data and a tenth more find no state at the last pressure.
+        thin = (
+            case.body.unit.chambers.wall_mm < 1.1 * WALL_MM and case.body.unit.lattice.cells_y_plus == CELLS
+        )
+        result = reached(case, cache)
+        return (
+            Result(np.where(np.arange(result.values.shape[1]) < 2, np.nan, result.values)) if thin else result
+        )
+
+    monkeypatch.setattr(unit_fem, "run", snaps)
+    found = diagnosed(written(tmp_path / "data"), tmp_path / "out")["unknown"]
+    best = found["fitted"][0]
+    assert best["fails"]
+    assert best["values"]["wall_mm"] < 1.1 * WALL_MM
+    assert "better found no equilibrium at some pressure when simulated" in found["words"]
+    told = min((*found["fitted"], *found["simulated"]), key=lambda s: (s["fails"], s["misfit"]))
+    assert f"wall mm {told['values']['wall_mm']:.3g} " in found["words"]
+
+
 def simulating(study):
     return study.simulating(study.self_contact, study.settings, study.unknown, study.unit)
 
