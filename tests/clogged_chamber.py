@@ -10,6 +10,7 @@ import pytest
 
 from mu_addon.design.parameters import load_preset
 from mu_addon.evidence import unit_fem
+from mu_addon.evidence.unit_settings import UnitSettings
 from mu_addon.measured import read_folder
 from mu_addon.studies.diagnose import Diagnose
 
@@ -31,9 +32,7 @@ def responses(unit, experiments, settings, cache, progress, held):
 def judge(folder):
     """Fill data/ and study/evidence/ of a folder, and said.json with the messages of the run."""
     data = bent_unit(folder / "data", {"clogged_chamber.share_lost": 0.5})
-    job = Diagnose(
-        data=read_folder(data), unit=load_preset("mu-1.0x"), settings=unit_fem.UnitSettings(whole=None)
-    )
+    job = Diagnose(data=read_folder(data), unit=load_preset("mu-1.0x"), settings=UnitSettings(whole=None))
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(unit_fem, "unit_responses", responses)
         context, messages = ended(job, folder / "study" / "evidence")

@@ -19,7 +19,7 @@ from benchmarks.table import options_of, print_head, print_row
 from mu_addon.design.parameters import load_preset
 from mu_addon.design.settings import PRESET
 from mu_addon.diagnose.unknown import unknown_of
-from mu_addon.evidence.unit_fem import KNOWN, UnitSettings
+from mu_addon.evidence.unit_settings import KNOWN, UnitSettings
 from mu_addon.measured import read_folder
 from mu_addon.meshing.settings import MeshSettings
 from mu_addon.run.context import RunContext

@@ -22,7 +22,7 @@ from ..evidence.prediction.bench import bench_simulators
 from ..evidence.readings import STAYS, dwell, quantum
 from ..evidence.simulator import Composite, Simulator
 from ..evidence.simulators import of_a_unit
-from ..evidence.unit_fem import UnitSettings
+from ..evidence.unit_settings import UnitSettings
 from ..evidence.verdict import Verdict
 from ..files import json_text
 from ..measured import Experiment, Remark

@@ -24,7 +24,7 @@ from ..evidence.prediction.unit_pressure import MODULUS, zero_of
 from ..evidence.record import record
 from ..evidence.simulator import Composite
 from ..evidence.simulators import of_a_unit
-from ..evidence.unit_fem import UnitSettings
+from ..evidence.unit_settings import UnitSettings
 from ..measured import Experiment
 from ..optimization.freedoms import Freedom, changed_unit, read_freedoms
 from ..reading import text_in

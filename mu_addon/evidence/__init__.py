@@ -23,7 +23,8 @@ if TYPE_CHECKING:
     from .sensitivity import Sensitivity
     from .simulator import Composite, Simulator, bends, unit_behind
     from .simulators import bending_freely, of_a_unit, simulations_plan
-    from .unit_fem import UnitSettings, unit_responses
+    from .unit_fem import unit_responses
+    from .unit_settings import UnitSettings
     from .verdict import Verdict
 else:
     __getattr__, __dir__, __all__ = public_face(__name__)

@@ -18,7 +18,7 @@ from .prediction import blocked_force, pressure_step, unit_pose, unit_pressure
 from .simulator import Simulator
 
 if TYPE_CHECKING:
-    from .unit_fem import UnitSettings
+    from .unit_settings import UnitSettings
 
 LATTICE = "lattice"
 LATTICE_S, UNIT_S = 90.0, 24.0

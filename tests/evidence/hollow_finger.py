@@ -73,7 +73,7 @@ def in_place_of_units(made=finger):
     """Let evidence simulate such bodies."""
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr("mu_addon.body.printed_mesh.mesh_printed", made)
-        patch.setattr("mu_addon.evidence.unit_fem.mesh_printed", made)
+        patch.setattr("mu_addon.evidence.unit_plan.mesh_printed", made)
         unit_body._mesh_kept.cache_clear()
         yield
     unit_body._mesh_kept.cache_clear()

@@ -9,7 +9,8 @@ from mu_addon.evidence.diagnosis import diagnose
 from mu_addon.evidence.effect import Parameter
 from mu_addon.evidence.prediction.unit_pressure import DISCREPANCIES, UnitPressure, UnitResponse, Variant
 from mu_addon.evidence.simulator import Composite
-from mu_addon.evidence.unit_fem import DISCREPANCY, FARTHER, UNEVEN
+from mu_addon.evidence.unit_fem import FARTHER, UNEVEN
+from mu_addon.evidence.unit_settings import DISCREPANCY
 from tests.evidence import analytic
 
 

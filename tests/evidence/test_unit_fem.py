@@ -16,17 +16,10 @@ from mu_addon.evidence.effects import STATIC as EFFECTS
 from mu_addon.evidence.markers import attached, material_points, nearest
 from mu_addon.evidence.prediction.unit_pressure import UnitPressure
 from mu_addon.evidence.unit_body import Body, down
-from mu_addon.evidence.unit_fem import (
-    Result,
-    Run,
-    UnitResponseWarning,
-    UnitSettings,
-    _Plan,
-    pressures,
-    run,
-    unit_responses,
-)
-from mu_addon.evidence.unit_run import _from_beside, _states
+from mu_addon.evidence.unit_fem import UnitResponseWarning, unit_responses
+from mu_addon.evidence.unit_plan import UnitPlan
+from mu_addon.evidence.unit_run import Result, Run, _from_beside, _states, run
+from mu_addon.evidence.unit_settings import UnitSettings, pressures
 from mu_addon.fem.clogged import CloggedModel
 from mu_addon.fem.equilibrium import Equilibrium
 from mu_addon.fem.model import Model
@@ -335,7 +328,7 @@ def test_without_x_a_marker_lies_in_the_mirror_plane(mesh):
 
 def markers_of(experiment):
     """Where the markers of an experiment at 1.0x sit on the unit."""
-    return _Plan.of(UNIT, [experiment], 1.0, None, UnitSettings(), None, {}).markers
+    return UnitPlan.of(UNIT, [experiment], 1.0, None, UnitSettings(), None, {}).markers
 
 
 def test_a_marker_off_the_unit_is_named():
@@ -488,7 +481,7 @@ def planned(settings, at=(-6.0, 0.0, 8.0, 12.0), readings=(-6.0, 12.0)):
     """Runs of a unit without markers, of which each has the same angles."""
     found = mock.MagicMock()
     found.__getitem__.return_value = Result(np.arange(len(at))[None] - 1.0)
-    return _Plan(Body(UNIT), settings, 1.0, 1.0, ((0.0, X),), at, readings, (), frozenset(), found)
+    return UnitPlan(Body(UNIT), settings, 1.0, 1.0, ((0.0, X),), at, readings, (), frozenset(), found)
 
 
 def test_a_first_look_runs_few_sizes_and_a_name_asks_for_the_others():
@@ -508,7 +501,7 @@ def test_a_first_look_runs_few_sizes_and_a_name_asks_for_the_others():
 def test_an_effect_is_believed_no_further_than_a_first_look_at_it():
     plan, bounds = planned(UnitSettings()), {}
     for name in ("strain_stiffening", "wall_thickness"):
-        p = plan._variant(name, (0.0, X), lambda result: result.values).parameter
+        p = unit_fem._variant(plan, name, (0.0, X), lambda result: result.values).parameter
         bounds[name] = p.low, p.high
     assert bounds == {"strain_stiffening": (0.0, 1.0), "wall_thickness": (0.8, 1.3)}
 
@@ -516,7 +509,7 @@ def test_an_effect_is_believed_no_further_than_a_first_look_at_it():
 def test_a_change_goes_on_beyond_the_readings_alone():
     plan = planned(UnitSettings(), (-12.0, -8.0, 0.0, 8.0, 12.0), (-9.0, 12.0))
     plan.found.__getitem__.return_value = Result(np.array([[-32.0, -13.0, 0.0, 5.0, 7.0]]))
-    found = plan._continued(Result(np.array([[np.nan, -11.0, 0.0, 4.0, np.nan]]), "it collapses"))
+    found = unit_fem._continued(plan, Result(np.array([[np.nan, -11.0, 0.0, 4.0, np.nan]]), "it collapses"))
     # At -12 kPa 1.5 times the change at -8 kPa; at 12 kPa, which was read, nothing is made up.
     np.testing.assert_allclose(found.values, [[-29.0, -11.0, 0.0, 4.0, np.nan]])
     assert found.why == "it collapses"
@@ -531,7 +524,7 @@ def test_another_design_ends_with_the_readings_and_its_change_goes_on_in_proport
     own = np.array(other.pressures_kPa)
     assert (own[0], own[-1], np.abs(np.diff(own)).max()) == (-10.0, 40.0, 2.5)
     plan.found.__getitem__.return_value = Result((0.5 * own + 0.01 * own**2)[None])
-    found = plan._of_design(other, [0], at, 0.5 * at[None]) - 0.5 * at
+    found = unit_fem._of_design(plan, other, [0], at, 0.5 * at[None]) - 0.5 * at
     np.testing.assert_allclose(found, [[1.2, 0.36, 0.0, 5.76, 19.2]], atol=1e-9)
     unread = attrs.evolve(plan, readings_kPa=(0.0, 40.0)).of_designs(designs)[1]
     assert unread.pressures_kPa[:2] == (-12.0, 0.0)

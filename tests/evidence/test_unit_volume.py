@@ -8,7 +8,9 @@ from mu_addon.evidence.diagnosis import diagnose
 from mu_addon.evidence.prediction.unit_pressure import UnitPressure, UnitResponse
 from mu_addon.evidence.simulator import Composite
 from mu_addon.evidence.unit_body import Body
-from mu_addon.evidence.unit_fem import Run, UnitSettings, run, unit_responses
+from mu_addon.evidence.unit_fem import unit_responses
+from mu_addon.evidence.unit_run import Run, run
+from mu_addon.evidence.unit_settings import UnitSettings
 from mu_addon.fem.equilibrium import Equilibrium
 from mu_addon.meshing.settings import MeshSettings
 

@@ -23,7 +23,7 @@ from mu_addon.evidence.prediction.lattice_compression import LatticeStress
 from mu_addon.evidence.prediction.unit_pressure import UnitPressure
 from mu_addon.evidence.simulator import Composite
 from mu_addon.evidence.simulators import simulations_plan
-from mu_addon.evidence.unit_fem import UnitSettings
+from mu_addon.evidence.unit_settings import UnitSettings
 from mu_addon.measured import read_folder
 from mu_addon.nodes.definitions import definitions
 from mu_addon.run.folder import keep_inputs

@@ -11,9 +11,9 @@ import pytest
 from mu_addon.design.parameters import load_preset
 from mu_addon.diagnose.unknown import read_unknown
 from mu_addon.errors import InputError
-from mu_addon.evidence import unit_fem
-from mu_addon.evidence.unit_fem import UnitSettings
+from mu_addon.evidence import unit_fem, unit_plan
 from mu_addon.evidence.unit_run import Result
+from mu_addon.evidence.unit_settings import UnitSettings
 from mu_addon.measured import read_folder
 from mu_addon.meshing.settings import MeshSettings
 from mu_addon.studies.diagnose import EFFECTS, SIZES, Diagnose
@@ -55,7 +55,7 @@ def closed_form(monkeypatch):
 
     monkeypatch.setattr(unit_fem, "run", run)
     # No mesh of a unit is solved on.
-    monkeypatch.setattr(unit_fem, "mesh_printed", finger)
+    monkeypatch.setattr(unit_plan, "mesh_printed", finger)
 
 
 def written(folder):

@@ -11,7 +11,9 @@ from mu_addon.evidence.effects import STATIC as EFFECTS
 from mu_addon.evidence.prediction.unit_pressure import UnitPressure
 from mu_addon.evidence.simulator import Composite
 from mu_addon.evidence.unit_body import Body
-from mu_addon.evidence.unit_fem import Run, UnitSettings, run, unit_responses
+from mu_addon.evidence.unit_fem import unit_responses
+from mu_addon.evidence.unit_run import Run, run
+from mu_addon.evidence.unit_settings import UnitSettings
 from mu_addon.fem.dead_loads import STANDARD_GRAVITY
 from mu_addon.fem.laws import Foam, Layered, NeoHooke, Yeoh
 from mu_addon.meshing.mesh import LATTICE
