@@ -29,7 +29,7 @@ BASE = "unit"
 """Stage of a unit that bends freely."""
 HELD = "unit with its tip held"
 """Stage of a unit on a load cell."""
-DESIGNS, DESIGN_S = "unit of every design", 60.0
+DESIGNS, DESIGN_S = "unit of every design", 90.0
 """Stage of units with other values of unknown parameters, and the seconds of one of them."""
 TOUCHING_KPA, TOUCHING = -8.0, 2.0
 """Reading below which walls of a unit may touch, and the factor on its seconds then."""
@@ -92,4 +92,4 @@ def of_a_unit(
         made = (HELD_TIP if held else FREE).items()
         found = {kind: predicts(responses, experiments) for kind, predicts in made if kind in kinds}
     # Location and remedy on further lines belong to a simulation that nobody asked for.
-    return found, [str(warning.message).partition("\n")[0] for warning in caught]
+    return found, [*dict.fromkeys(str(warning.message).partition("\n")[0] for warning in caught)]

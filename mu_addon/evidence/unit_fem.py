@@ -205,7 +205,9 @@ def _surface(plan: UnitPlan, rows: Sequence[int], at: Array, base: Array, coarse
         if np.isnan(response).any():
             pairs = zip(designs.parameters, place, strict=True)
             shape = ", ".join(f"{p.name} {v:g}" for p, v in pairs)
-            _warn(f"{shape} at {plan.scale:g}x is left out: {plan.result(case).why}")
+            # Where all lengths scale it is the same at every scale, and said once.
+            scale = "" if plan.enlarged == plan.scale else f" at {plan.scale:g}x"
+            _warn(f"{shape}{scale} is left out: {plan.result(case).why}")
         else:
             places.append(place)
             values.append(response)
