@@ -90,7 +90,7 @@ def place(folder, job):
         return graph_search.Predicted(0.1 + np.arange(len(chains)), ())
 
     made_up = {
-        "candidates.PrintedWaveguides": Waveguides,
+        "compared_pressures.PrintedWaveguides": Waveguides,
         "graph_search.influence_map": influence,
         "graph_search.predicted": predicted,
         "graph_search.stable_part": lambda model, materials, motion, sides: motion,
