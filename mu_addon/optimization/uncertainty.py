@@ -24,18 +24,17 @@ class Uncertainty:
     modulus_share: float
 
     def freedoms(self, unit: Unit) -> list[Freedom]:
-        """Scatter from print to print as freedoms: the surfaces' offsets, and the resin's modulus."""
+        """Scatter from print to print as freedoms: the surfaces' offset, and the resin's modulus."""
         return [
-            Freedom("print.offset_xy_mm", -0.3, 0.5, unit="mm"),
-            Freedom("print.offset_z_mm", -0.3, 0.5, unit="mm"),
+            Freedom("print.offset_xy_mm", -0.3, 0.5, also={"print.offset_z_mm": 1.0}, unit="mm"),
             Freedom("material.membrane_modulus_kPa", 10.0, 1e6, unit="kPa"),
         ]
 
     def errors(self, unit: Unit, slopes: Array) -> tuple[Array, Array]:
-        """Standard errors (q,) of quantities by print and by resin, of their slopes (q, 3) by `freedoms`.
+        """Standard errors (q,) of quantities by print and by resin, of their slopes (q, 2) by `freedoms`.
 
-        Both offsets of a print err alike. A slope that is nan is not known, and counts as 0.
+        A slope that is nan is not known, and counts as 0.
         """
-        along_xy, along_z, by_modulus = np.nan_to_num(slopes).T
+        by_print, by_modulus = np.abs(np.nan_to_num(slopes)).T
         modulus = unit.material.membrane_modulus_kPa
-        return self.print_mm * np.abs(along_xy + along_z), self.modulus_share * modulus * np.abs(by_modulus)
+        return self.print_mm * by_print, self.modulus_share * modulus * by_modulus
