@@ -12,10 +12,10 @@ FEW = 16
 DIGITS = 9
 LEFT_OUT = re.compile(
     r"""(^|\.)(\w*seconds\w*|versions?|revision|hash|digest|\w*sha256|mu_addon|uuid|process|processor\w*|cost_s|started|ended
-        |date|time|created|written|finished|\w*memory_MB|workers?|largest_relative_residual)(\.|$|\[)""",
+        |date|time|created|written|finished|\w*memory_MB|workers?|largest_relative_residual|cubic_error)(\.|$|\[)""",
     re.VERBOSE,
 )
-"""Keys whose values are times, places, versions, hashes, or what an iteration leaves."""
+"""Keys of times, places, versions, hashes, what an iteration leaves, and how symmetric a mesh came out."""
 NOT_LISTED = re.compile(r"(^|/)(cache|nodes|__pycache__|\.[^/]*)/|(^|/)run\.lock$|\.tmp$")
 """Files that are no result: their names are hashes, or they go with the process."""
 NOT_SAID = re.compile(
