@@ -194,6 +194,8 @@ class Shapes:
         better = (
             f"; {counted(failing, 'shape that fits', 'shapes that fit')} better found no equilibrium at some "
             "pressure when simulated"
+            if failing
+            else ""
         )
         unit = self.channel.rpartition("_")[2]
         shape = ", ".join(
@@ -206,9 +208,7 @@ class Shapes:
             f"of the unknown parameters, what fits best ({how}) is {shape}, modulus factor "
             f"{best.modulus:.3g}{ends}; "
             f"chi squared {best.misfit:.3g} is left of {self.readings} readings; "
-            f"the surface between {len(self.simulated)} units is off by {self.error:.2g} {unit}"
-            + better
-            * bool(failing)
+            f"the surface between {len(self.simulated)} units is off by {self.error:.2g} {unit}{better}"
         )
 
     def as_json(self) -> dict[str, Any]:

@@ -23,10 +23,18 @@ UNIT, MODEL = "unit.toml", "model.toml"
 _LONGEST_PATH = 1 << 18
 
 
-def asked(of: type[Input], name: str, text: str, default: str = "", *, empty: Any = None, **more: Any) -> Any:
+def asked(
+    of: type[Input],
+    name: str,
+    text: str,
+    default: str = "",
+    *,
+    empty: Any = None,
+    group: str = "",
+    **more: Any,
+) -> Any:
     """attrs field of an input that is made of one text; empty: its value without it; more: of the input."""
-    own = described(name, default, text, group=more.get("group", ""))
-    return given(of(descriptions=(own,), **more), default=empty)
+    return given(of(descriptions=(described(name, default, text, group=group),), **more), default=empty)
 
 
 def once(described: Description, **more: Any) -> Any:

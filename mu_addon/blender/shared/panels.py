@@ -119,7 +119,12 @@ def draw_settings(layout, fields: Iterable[Field], enabled: bool = True) -> dict
 def fields_of(owner, hidden: Collection[str] = ()) -> list[Field]:
     """The settings of a property group, in its order, without hidden ones."""
     shown = {name: d for name, d in described_fields(owner).items() if name not in hidden}
-    return [Field(d, partial(_draw, owner=owner, name=name)) for name, d in shown.items()]
+    return [field_of(owner, name, d) for name, d in shown.items()]
+
+
+def field_of(owner, name: str, d: Description) -> Field:
+    """A setting that is drawn as the property of this name."""
+    return Field(d, partial(_draw, owner=owner, name=name))
 
 
 def _draw(layout, owner, name: str) -> None:

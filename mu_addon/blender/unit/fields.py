@@ -1,7 +1,7 @@
 """Blender properties of a unit's parameters; panels show the true length in mm."""
 
 from collections.abc import Callable
-from functools import cache, partial
+from functools import cache
 from typing import Any
 
 import bpy
@@ -12,7 +12,7 @@ from ...design.quantity import Description, describe
 from ...design.repairs import tied
 from ..shared import updates
 from ..shared.blender_property import Choice, blender_property, exact, millimetres, step_of
-from ..shared.panels import Field, draw_settings
+from ..shared.panels import draw_settings, field_of
 from ..shared.wording import anchors_of, label, path_symbol, tooltip
 
 
@@ -57,11 +57,7 @@ def field(group, d: Description) -> str:
 def draw_section(layout, props, section: type) -> None:
     """Draw the fields of a section of a unit's or gripper's parameters."""
     group = getattr(props, section.section)
-    draw_settings(layout, [Field(d, partial(_draw, group=group, d=d)) for d in describe(section)])
-
-
-def _draw(layout, group, d: Description) -> None:
-    layout.prop(group, field(group, d))
+    draw_settings(layout, [field_of(group, field(group, d), d) for d in describe(section)])
 
 
 def tied_update(name: str, changed):
