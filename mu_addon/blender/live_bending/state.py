@@ -149,11 +149,10 @@ def _switched(root: Any) -> None:
     if not uuid:
         return
     if root.mu_live.on:
-        # Solid and result have shapes of their own.
+        # Solid and result have shapes of their own, and candidates lie on the unit at rest.
         root.mu_unit.show = "preview"
-        live = _every.setdefault(uuid, Live(studies.folder_of(root) / "live"))
-        live.design = ""
-        _changed(root)
+        unit_object.hide_candidates(root)
+        _begin(root)
         return
     found = _every.pop(uuid, None)
     if found is not None:
@@ -163,13 +162,20 @@ def _switched(root: Any) -> None:
     unit_object.show(root)
 
 
+def _begin(root: Any) -> None:
+    """Bend a unit that is switched on, whatever is shown of it."""
+    live = _every.setdefault(root.mu_unit.uuid, Live(studies.folder_of(root) / "live"))
+    live.design = ""
+    _changed(root)
+
+
 @connected(unit_object.REBUILT)
 def _changed(root: Any) -> None:
     """Dim the shape once the parameters have changed, and bend the unit anew as soon as they rest."""
     live = of(root)
     if live is None:
         if root.mu_live.on and root.mu_unit.uuid:  # a duplicate
-            _switched(root)
+            _begin(root)
         return
     design, shape = studies.design_of(root), live.shape
     if shape is not None and shape.cut != root.mu_unit.cut:
@@ -319,11 +325,21 @@ def _answered(root: Any, live: Live) -> bool:
     if answer["trouble"]:
         live.trouble = answer["trouble"]
         return True
-    kept = live.current
-    if kept is not None and answer["error"] > kept.error and answer["states"][-1][0] <= kept.pressure_kPa[-1]:
-        return False  # coarser than the one from before, which shows as much
+    if live.current is not None and not _is_better(answer, live.current, root.mu_live.pressure_kPa):
+        return False
     live.arrived = _shape(root, read_motion(live.folder / answer["folder"]), answer, live.design)
     return True
+
+
+def _is_better(answer: dict[str, Any], kept: Shape, kPa: float) -> bool:
+    """Return True if an answer may take the place of a shape: a step back in what is shown never does.
+
+    A finer one that has not reached the pressure yet waits until it has, or ends before it.
+    """
+    reach, shown = min(answer["states"][-1][0], kPa), min(float(kept.pressure_kPa[-1]), kPa)
+    if answer["error"] > kept.error:
+        return reach > shown
+    return reach >= shown or answer["finished"]
 
 
 def _shape(root: Any, motion: Motion, answer: dict[str, Any], design: str) -> Shape:
@@ -410,8 +426,8 @@ def _restored(*_: Any) -> None:
         if not root.mu_live.on or of(root) is None:
             if parts(root):
                 _seen(root, False)
-            if root.mu_live.on:
-                _switched(root)
+            if root.mu_live.on and root.mu_unit.uuid:
+                _begin(root)
         else:
             _changed(root)
             place(root)

@@ -19,15 +19,30 @@ LEAST_DEG = 0.1
 
 
 def draw(layout: Any, root: Any) -> None:
-    """Draw the switch, the slider next to it, and the result, with the same height in every state."""
+    """Draw the switch, the slider next to it, and the result, with the same height in every state.
+
+    Behind the solid, a result or candidates the switch is grey: it would change nothing that is seen.
+    """
+    layout, reason = layout.column(), behind(root)
+    layout.enabled = not reason
     row = plain_row(layout)
-    row.prop(root.mu_live, "on", toggle=True, icon="MOD_SIMPLEDEFORM", text="Bend")
-    right = row.row(align=True)
-    right.active = root.mu_live.on
-    right.prop(root.mu_live, "pressure_kPa", text="kPa", slider=True)
+    row.prop(root.mu_live, "on", toggle=True, icon="MOD_SIMPLEDEFORM", text=f"Bend{reason}")
+    if not reason:
+        right = row.row(align=True)
+        right.active = root.mu_live.on
+        right.prop(root.mu_live, "pressure_kPa", text="kPa", slider=True)
     if root.mu_live.on:
         layout.label(text=words(root), icon="MOD_SIMPLEDEFORM")
         plain_row(layout).prop(root.mu_live, "colour", expand=True)
+
+
+def behind(root: Any) -> str:
+    """Where the bend of a unit that is switched on waits to be seen again; "" if it is seen."""
+    if not root.mu_live.on:
+        return ""
+    if root.mu_unit.show != "preview":
+        return ": in Preview"
+    return ": candidates are at rest" if root.mu_unit.candidates else ""
 
 
 def words(root: Any) -> str:
@@ -57,7 +72,7 @@ def words(root: Any) -> str:
 def _draw() -> None:
     root = unit_object.active_root(bpy.context)
     live = None if root is None else state.of(root)
-    if root is None or live is None or root.mu_unit.show != "preview":
+    if root is None or live is None or behind(root):
         return
     place = legend.room(bpy.context, 1)
     legend.write(words(root), place.left, place.foot - 25 * place.scale, round(14 * place.scale))

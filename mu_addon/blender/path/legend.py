@@ -22,6 +22,7 @@ BETTER = "Mean deviation [mm], smaller is better"
 """Note on a ranking's numbers, next to the lattice and in the panel."""
 ESTIMATED = "Mean deviation [mm], estimated: no path is solved yet"
 UNDECIDED = "≈: undecided, closer than the mesh's error"
+AT_LEAST = "≥ (grey): not solved further, cannot be the best"
 BESIDE = 190
 """Pixels taken by the legend of a field, to the left of this one."""
 
@@ -32,14 +33,18 @@ def lines(known: ranking.Known) -> list[str]:
         return ["Mean deviation", "stale (grey): ranked with other parameters"]
     if known.estimated:
         return [ESTIMATED]
-    return [BETTER, *([UNDECIDED] if known.tied else [])]
+    notes = {UNDECIDED: known.tied, AT_LEAST: known.at_least}
+    return [BETTER, *(note for note, wanted in notes.items() if wanted)]
 
 
 def marks(known: ranking.Known) -> list[tuple[float, str]]:
-    """Share of the ramp's height and text of the smallest, the largest and round values of J between."""
+    """Share of the ramp's height and text of the smallest, the largest and round values of J between.
+
+    None of a single value, which the path's own label tells.
+    """
     low, high = min(known.numbers.values()), max(known.numbers.values())
     if not high > low:
-        return [(0.0, f"{low:.3g}")]
+        return []
     between = [v for v in legend.ticks(low, high) if 0.12 < known.share_of(v) < 0.9]
     return [(known.share_of(value), f"{value:.3g}") for value in (low, *between, high)]
 
@@ -79,11 +84,12 @@ def _legend(context: Any, root: Any, known: ranking.Known) -> None:
     place = legend.room(context, len(texts))
     if any(motion_parts.is_seen(root, part) for part in motion_parts.parts(root)):
         place = place.beside(BESIDE)
-    if known.stale:
+    found = [] if known.stale else marks(known)
+    if not found:
         legend.above(texts, attrs.evolve(place, height=0.0))
         return
     colours = np.array([field_colours.of_map(s) for s in np.linspace(0.0, 1.0, legend.PIECES + 1)])
-    legend.ramp(colours, marks(known), place)
+    legend.ramp(colours, found, place)
     legend.above(texts, place)
 
 

@@ -46,6 +46,8 @@ def path(context, root, name):
         name = window(to_unit(root.mu_unit), name).name
     with updates.paused():
         root.mu_unit.path = "" if name == "none" else name
+        # Where the waveguide is seen; a solid or a result is of the path before.
+        root.mu_unit.show = "preview"
     unit_object.rebuild(root)
 
 

@@ -317,12 +317,11 @@ class MU_PT_print_file(_OfPrint, bpy.types.Panel):
 
 def _verdict(layout, found, then: str) -> None:
     """Draw what a check found, in a line; then: what follows from errors."""
-    count = {s: sum(f["severity"] == s for f in found.content["findings"]) for s in marks.FAULTS}
-    if count["error"]:
-        alert(layout, f"The check found {counted(count['error'], 'error', 'errors')}: {then}", "CANCEL")
+    errors, words = printing.faults(found.content)
+    if errors:
+        alert(layout, f"The check found {words}: {then}", "CANCEL")
     else:
-        doubts = f", {counted(count['warning'], 'warning', 'warnings')} to decide on"
-        wrapped(layout, f"Checked: no errors{doubts if count['warning'] else ''}", "CHECKMARK")
+        wrapped(layout, f"Checked: {words}{' to decide on' if 'warning' in words else ''}", "CHECKMARK")
 
 
 def _written(layout, found) -> None:

@@ -15,6 +15,7 @@ import numpy as np
 
 from ...design.anchors import Window, window
 from ...design.parameters import Unit
+from ...design.printing.finding import counted
 from ...design.printing.printer import Limit, Printer, load_printer, printer_text
 from ...design.printing.sheets import measured_limits
 from ...design.solid import Solid
@@ -242,6 +243,13 @@ def errors(root: Any) -> str:
     found = CHECK.found(root)
     findings = [] if found is None or found.stale else found.content["findings"]
     return ", ".join(f["check"] for f in findings if f["severity"] == "error")
+
+
+def faults(content: dict[str, Any]) -> tuple[int, str]:
+    """Number of errors that a check found, and these and its warnings as text: "no errors, 2 warnings"."""
+    errors, warnings = (sum(f["severity"] == s for f in content["findings"]) for s in ("error", "warning"))
+    words = counted(errors, "error", "errors") if errors else "no errors"
+    return errors, f"{words}, {counted(warnings, 'warning', 'warnings')}" if warnings else words
 
 
 def _job(name: str, given: Any, where: str = "", **more: Any) -> study_job.StudyJob:

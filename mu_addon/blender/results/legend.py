@@ -34,6 +34,7 @@ LEAST = 40
 LINE = 18
 """Height of a line of text."""
 NO_COLOURS = ("This view's shading shows no colours:", "press Show Colours in its header")
+AS_SAVED = "linked without its run, coloured as at the frame that was saved"
 TEXT = (0.92, 0.92, 0.92, 1.0)
 
 
@@ -111,8 +112,11 @@ def lines(root: Any, motion: Any, scene: Any) -> list[str]:
 def _draw() -> None:
     context = bpy.context
     root = subject(context)
-    motion = None if root is None or not root.mu_motion.legend else motion_parts.motion_of(root)
+    if root is None or not root.mu_motion.legend:
+        return
+    motion = motion_parts.motion_of(root)
     if motion is None:
+        above([f"{root.name}: {AS_SAVED}"], attrs.evolve(room(context, 1), height=0.0))
         return
     shown = places.seen(root)
     scale = context.preferences.system.ui_scale

@@ -126,7 +126,7 @@ def _draw() -> None:
     if root is None:
         return
     size = round(12 * context.preferences.system.ui_scale)
-    if root.mu_motion.marker:
+    if root.mu_motion.marker and motion_parts.motion_of(root) is not None:
         _mark(context, root, size)
     probe = MU_OT_probe.running
     if probe is None or probe.found is None or probe.area != context.area:

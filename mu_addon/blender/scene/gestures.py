@@ -236,16 +236,31 @@ def _after_import(imported: Any) -> None:
     if objects:
         groups = (item.id for item in imported.import_items)
         nodes.unite([group for group in groups if isinstance(group, bpy.types.GeometryNodeTree)])
+        _without_meshes_made_objects(objects)
     if not any(displays.editable(obj) and displays.uuid_of(obj) for obj in objects):
         return
+    units = []
     for obj in objects:
         if displays.editable(obj) and displays.uuid_of(obj):
             own(obj)
             if obj.mu_unit.uuid and obj.type == "MESH":
+                units.append(obj)
                 # Blender may reuse a mesh that it imported before.
                 unit_object.separate(obj)
     look()
     preview_update.catch_up()
+    for unit in units:
+        unit_object.REBUILT.send(unit)
+
+
+def _without_meshes_made_objects(imported: list[Any]) -> None:
+    """Remove the objects that Blender makes of a unit's meshes that the unit keeps without showing them."""
+    units = [obj for obj in imported if obj.mu_unit.uuid]
+    kept = {m for unit in units for m in (unit.mu_unit.preview, unit.mu_unit.solid, unit.mu_unit.envelope)}
+    latest = max(obj.session_uid for obj in imported)
+    for obj in list(bpy.context.scene.objects):
+        if obj.session_uid > latest and obj.data is not None and obj.data in kept:
+            bpy.data.objects.remove(obj)
 
 
 def _size_instances(collections: set[Any]) -> None:

@@ -55,7 +55,10 @@ def _figures(root: Any) -> list[str]:
         except (MuError, *UNREADABLE) as error:
             kept = key, [str(error).split("\n")[0]]
         _kept[props.uuid] = kept
-    return kept[1] + [""] * (LINES - len(kept[1]))
+    check = printing.CHECK.found(root) if current else None
+    checked = [] if check is None or check.stale else [f"Checked: {printing.faults(check.content)[1]}"]
+    found = [*kept[1], *checked]
+    return found + [""] * (LINES - len(found))
 
 
 def _made(root: Any, current: bool) -> list[str]:

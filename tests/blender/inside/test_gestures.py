@@ -6,6 +6,7 @@ import pytest
 
 from mu_addon.blender.gripper import object as gripper_object
 from mu_addon.blender.jobs import start_child
+from mu_addon.blender.live_bending import state as live
 from mu_addon.blender.obstacles import state as obstacles
 from mu_addon.blender.path import candidates
 from mu_addon.blender.scene import gestures
@@ -314,6 +315,26 @@ def test_taken_from_a_file_where_it_shows_its_result_it_is_seen_at_rest_and_says
     if way == "appended":
         assert root.mu_unit.show == "preview"
         assert len(seen.data.vertices) > 20_000, "the skinned struts"
+
+
+def test_appended_bent_and_with_its_solid_it_bends_and_brings_no_other_object(tmp_path):
+    root = add(preset="mu-0.75x")
+    root.name = "stored"
+    assert bpy.ops.mu.solid() == {"FINISHED"}
+    solid = root.mu_unit.solid.name
+    root.mu_live.on = True
+    file = tmp_path / "library.blend"
+    bpy.ops.wm.save_as_mainfile(filepath=str(file))
+    bpy.ops.wm.read_factory_settings(use_empty=True)
+    fetched(file, "stored", link=True)
+    assert bpy.context.scene.objects.keys() == ["stored"]
+    bpy.ops.wm.read_factory_settings(use_empty=True)
+    root = fetched(file, "stored", link=False)
+    assert bpy.context.scene.objects.keys() == ["stored"]
+    assert root.mu_unit.solid.name == solid
+    assert unit_object.solid_is_current(root)
+    assert live.of(root) is not None
+    root.mu_live.on = False
 
 
 def test_appended_beside_another_it_has_one_skin(tmp_path):

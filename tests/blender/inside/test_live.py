@@ -151,6 +151,44 @@ def test_a_unit_bends_at_the_sliders_pressure_and_anew_after_a_change(tmp_path):
     root.mu_live.on = False
 
 
+def test_an_opened_file_shows_what_was_saved_and_bend_waits_grey_behind_it(tmp_path):
+    root = add(preset="mu-0.75x")
+    assert bpy.ops.mu.solid() == {"FINISHED"}
+    root.mu_live.on = True
+    assert words.behind(root) == ""
+    root.mu_unit.show = "solid"
+    assert words.behind(root) == ": in Preview"
+    bpy.ops.wm.save_as_mainfile(filepath=str(tmp_path / "saved.blend"))
+    bpy.ops.wm.open_mainfile(filepath=str(tmp_path / "saved.blend"))
+    (root,) = unit_object.roots()
+    assert root.mu_unit.show == "solid"
+    assert live.of(root) is not None
+    root.mu_unit.show = "preview"
+    root.mu_unit.candidates = True
+    assert words.behind(root) == ": candidates are at rest"
+    root.mu_live.on = False
+    root.mu_live.on = True
+    assert not root.mu_unit.candidates
+    root.mu_live.on = False
+
+
+@pytest.mark.parametrize(
+    ("error", "reaches_kPa", "finished", "better"),
+    [
+        (0.09, 20.0, False, False),  # the same mesh computed anew, its first pressure
+        (0.09, 40.0, False, True),
+        (0.03, 10.0, False, False),  # finer, and not there yet
+        (0.03, 50.0, False, True),
+        (0.03, 30.0, True, True),  # finer, and no equilibrium beyond
+        (0.20, 80.0, False, False),  # coarser, beyond what is asked for
+    ],
+)
+def test_a_shape_is_never_followed_by_one_that_bends_less_far(error, reaches_kPa, finished, better):
+    kept = SimpleNamespace(error=0.09, pressure_kPa=np.array([0.0, 40.0]))
+    answer = {"error": error, "states": [[0.0, 0.0], [reaches_kPa, 9.6]], "finished": finished}
+    assert live._is_better(answer, kept, 40.0) is better
+
+
 def test_a_real_job_comes_first(monkeypatch, tmp_path):
     root = add(preset="mu-1.0x")
     root.mu_unit.chambers.count = 3

@@ -12,7 +12,7 @@ from mu_addon.blender.jobs import start_child as jobs
 from mu_addon.blender.printing import layer, marks
 from mu_addon.blender.printing import panel as print_panel
 from mu_addon.blender.printing import state as printing
-from mu_addon.blender.sidebar import unit_panel
+from mu_addon.blender.sidebar import figures, unit_panel
 from mu_addon.blender.simulate import study_folder as studies
 from mu_addon.blender.simulate import timings
 from mu_addon.blender.unit import object as unit_object
@@ -93,6 +93,7 @@ def test_a_check_from_start_to_markers(tmp_path):
         assert fault["check"].capitalize() in texts
     assert "checks passed" in texts
     assert "Checked: no errors" in texts
+    assert f"Checked: no errors, {len(faults)} warning" in figures.lines(root, 36)[0][-1]
     assert "Stale" not in texts
     best = found.content["orientation"][0]
     assert f"{best['islands']} islands" in texts
@@ -148,7 +149,8 @@ def test_markers_lead_to_every_place_and_undo_takes_them_back(tmp_path):
     texts = drawn()
     assert "3 islands, cups below 0.01 ml" in texts
     assert texts.index("Thinnest solid  (2):  0.2 / 0.4 mm") < texts.index("Bridge:  21.4 / 21 mm")
-    assert "1 error: export asks first" in texts
+    assert "The check found 1 error" in texts
+    assert ": export asks first" in texts
     assert "7 islands, cups of 0.25 ml" in texts
     assert texts.index("Not examined") < texts.index("1 checks passed")
     bpy.ops.ed.undo_push(message="before")
