@@ -151,9 +151,9 @@ def _import(operator, root):
             one = state.answers.add()
             one.key, one.words, one.experiment = question.key, question.words, p.name
             one.choices, one.value = "\n".join(question.choices), question.proposed
-        operator.report(
-            {"WARNING"}, counted(len(found.asked), "question", "questions") + " in the panel Evidence"
-        )
+        # No warning: its popup would cover the fields, and hold the mouse.
+        asked = counted(len(found.asked), "question", "questions")
+        operator.report({"INFO"}, f"{asked} in the panel Evidence")
         viewports.redraw()
         return {"FINISHED"}
     root.mu_evidence.folder = str(folder)

@@ -55,7 +55,7 @@ def _figures(root: Any) -> list[str]:
         except (MuError, *UNREADABLE) as error:
             kept = key, [str(error).split("\n")[0]]
         _kept[props.uuid] = kept
-    check = printing.CHECK.found(root) if current else None
+    check = printing.CHECK.found(root)
     checked = [] if check is None or check.stale else [f"Checked: {printing.faults(check.content)[1]}"]
     found = [*kept[1], *checked]
     return found + [""] * (LINES - len(found))
