@@ -9,6 +9,7 @@ from __future__ import annotations
 import time
 import uuid
 from collections.abc import Iterator
+from contextlib import suppress
 from pathlib import Path
 from typing import Any
 
@@ -71,9 +72,11 @@ def folder_of(tree: Any) -> Path:
 
 
 def _number(tree: Any) -> str:
-    """UUID of a tree, created on the first call."""
+    """UUID of a tree, created on the first call that is not of a panel's drawing, which has none yet."""
     if not tree.mu_uuid:
-        tree.mu_uuid = uuid.uuid4().hex
+        # Blender lets nothing be written while it draws.
+        with suppress(AttributeError):
+            tree.mu_uuid = uuid.uuid4().hex
     return str(tree.mu_uuid)
 
 

@@ -116,7 +116,8 @@ def _draw() -> None:
         return
     motion = motion_parts.motion_of(root)
     if motion is None:
-        above([f"{root.name}: {AS_SAVED}"], attrs.evolve(room(context, 1), height=0.0))
+        texts = [f"{root.name}: {AS_SAVED}", *(() if viewports.shows_colours(context) else NO_COLOURS)]
+        above(texts, attrs.evolve(room(context, len(texts)), height=0.0))
         return
     shown = places.seen(root)
     scale = context.preferences.system.ui_scale

@@ -112,7 +112,7 @@ class MU_OT_colours(bpy.types.Operator):
 @menu("VIEW3D_MT_editor_menus")
 def draw_colours(self, context) -> None:
     """Draw, in the header of a 3D view that cannot show the colours that are there, the button for it."""
-    if not viewports.shows_colours(context) and any(map(places.coloured, unit_object.roots())):
+    if not viewports.shows_colours(context) and unit_object.first_that(context, places.coloured) is not None:
         row = self.layout.row()
         row.alert = True
         row.operator("mu.colours", icon="COLOR")
