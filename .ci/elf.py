@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import struct
-from collections.abc import Iterator
+from collections.abc import Collection, Iterator
 from typing import NamedTuple
 
 _DYNAMIC = 6  # SHT_DYNAMIC
@@ -75,6 +75,16 @@ def libraries(content: bytes) -> list[str]:
 def dynamic(content: bytes) -> list[Section]:
     """The section that the loader reads: one in a library."""
     return [section for section in _sections(content) if section.kind == _DYNAMIC]
+
+
+def struck(content: bytes, names: Collection[str]) -> bytes:
+    """The library without these among those that the loader looks for."""
+    (table,) = dynamic(content)
+    gone = {library.at for library in needed(content) if library.name in names}
+    places = range(table.offset, table.offset + table.size, table.entry)
+    kept = b"".join(content[at : at + table.entry] for at in places if at not in gone)
+    # The table ends with its first entry of zeros.
+    return content[: table.offset] + kept.ljust(table.size, b"\0") + content[table.offset + table.size :]
 
 
 def loaded(content: bytes) -> bytes:

@@ -48,10 +48,5 @@ def without_window(content: bytes) -> bytes:
     for symbol in elf.symbols(content):
         if not symbol.defined and NAMES.match(symbol.name):
             made[symbol.at + _INFO] = _WEAK | (made[symbol.at + _INFO] & 0xF)
-    (table,) = elf.dynamic(content)
-    struck = {library.at for library in elf.needed(content) if LIBRARIES.match(library.name)}
-    places = range(table.offset, table.offset + table.size, table.entry)
-    kept = b"".join(content[at : at + table.entry] for at in places if at not in struck)
-    # The table ends with its first entry of zeros.
-    made[table.offset : table.offset + table.size] = kept.ljust(table.size, b"\0")
-    return bytes(made)
+    names = {library.name for library in elf.needed(content) if LIBRARIES.match(library.name)}
+    return elf.struck(bytes(made), names)

@@ -2,11 +2,11 @@
 
 A slimmed wheel is made from the pinned one and no other: every file that stays is the same to the byte, but
 for the list of files (RECORD), the build tag in WHEEL, and libraries for Linux: all without what no loader
-reads (elf.py), Warp's without CUDA (warp_cpu.py), gmsh's without its window (gmsh_window.py). Of modules only
-those are left out that their package does without where it is built so: cvxopt's four, which its own build
-leaves out unless asked, and Pillow's AVIF. Another extension that bundles the whole wheel gets it (BUILD);
-licences stay. `sbom.cdx.json` names the wheel that it was made from, with its SHA-256, and what was left out
-or replaced.
+reads (elf.py), cvxopt's without ATLAS, of which OpenBLAS has every name, Warp's without CUDA (warp_cpu.py),
+gmsh's without its window (gmsh_window.py). Of modules only those are left out that their package does without
+where it is built so: cvxopt's four, which its own build leaves out unless asked, and Pillow's AVIF. Another
+extension that bundles the whole wheel gets it (BUILD); licences stay. `sbom.cdx.json` names the wheel that it
+was made from, with its SHA-256, and what was left out or replaced.
 
 Large files are compressed by LZMA, which takes a third less than deflate: Blender builds its Python with it
 on every system.
@@ -27,12 +27,15 @@ from typing import NamedTuple
 import elf
 
 _ASKED_FOR = ("dsdp", "fftw", "glpk", "gsl")
+_DOUBLED = "cvxopt.libs/libsatlas-*", "cvxopt.libs/libopenblas*"
+"""A library whose every name the second has, too, which is loaded first: the loader takes it from there."""
 PARTS = {
     "contourpy": (),
     # With the libraries that no other module asks for.
     "cvxopt": (
         *(f"cvxopt/{name}.*" for name in _ASKED_FOR),
         *(f"cvxopt.libs/lib{name}*" for name in (*_ASKED_FOR, "gmp-")),
+        _DOUBLED[0],
     ),
     # Every compiled module has its source in Python beside it, which takes its place.
     "fonttools": tuple(f"fontTools/*.{ending}" for ending in ("c", "pyx", "pxd", "so", "pyd")),
@@ -124,6 +127,7 @@ def differences(
     package = Path(str(original.filename)).name.split("-")[0].lower()
     expected = {n for n in original.namelist() if not _left_out(n, PARTS.get(package, ()))}
     names = set(made.namelist())
+    gone = set(original.namelist()) - expected
     wrong = [f"{name} was added" for name in sorted(names - expected)]
     wrong += [f"{name} was lost" for name in sorted(expected - names)]
     own = _own(original)
@@ -131,7 +135,7 @@ def differences(
         if hashlib.sha256(made.read(name)).hexdigest() != replaced[name]:
             wrong.append(f"{name} has another SHA-256 than pinned")
     for name in sorted(names & expected - set(own) - replaced.keys()):
-        if made.read(name) != elf.loaded(original.read(name)):
+        if made.read(name) != elf.loaded(_without(original, name, original.read(name), gone)):
             wrong.append(f"{name} was changed")
     return wrong
 
@@ -149,19 +153,30 @@ def _shortened(
 
     Raises RuntimeError where one that stays asks for one that is left out.
     """
-    gone = {name.rpartition("/")[2] for name in left_out}
     made = {}
     for name in source.namelist():
         if ".so" not in name or name in left_out or name in replaced:
             continue
         content = source.read(name)
-        missing = sorted(gone.intersection(elf.libraries(content)))
-        if missing:
-            raise RuntimeError(f"{name} asks for {missing[0]}, which is left out (slim.py)")
-        shorter = elf.loaded(content)
+        shorter = elf.loaded(_without(source, name, content, left_out))
         if shorter != content:
             made[name] = shorter
     return made
+
+
+def _without(source: zipfile.ZipFile, name: str, content: bytes, left_out: set[str]) -> bytes:
+    """A library that asks for none of those left out: one of them may go whose names another has, too."""
+    asked = set(elf.libraries(content))
+    gone = {one for one in left_out if one.rpartition("/")[2] in asked}
+    if not gone:
+        return content
+    doubled, other = ({one for one in source.namelist() if fnmatchcase(one, pattern)} for pattern in _DOUBLED)
+    if gone <= doubled:
+        wanted = {symbol.name for symbol in elf.symbols(content) if not symbol.defined}
+        lost, there = (set[str]().union(*(elf.exported(source.read(x)) for x in y)) for y in (gone, other))
+    if not gone <= doubled or wanted & lost - there:
+        raise RuntimeError(f"{name} asks for {min(gone)}, which is left out (slim.py)")
+    return elf.struck(content, {one.rpartition("/")[2] for one in gone})
 
 
 def _own(package: zipfile.ZipFile) -> tuple[str, str]:

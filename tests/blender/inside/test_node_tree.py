@@ -304,7 +304,7 @@ def test_saved_and_opened_again_a_tree_is_the_same_driven_and_all_even_without_t
     assert {s.state for s in state.refresh(tree).values()} <= {"cached", "computed"}
     assert state.folder_of(tree).parent.name == "tree.mu"
     if bpy.app.version < (5, 0):
-        return  # Without the extension Blender 4.5 ends in reading a group's sockets, of a kind that it lacks.
+        return  # Without the extension, Blender 4.5 ends where it reads a group whose sockets it lacks.
     mu_addon.unregister()
     bpy.ops.wm.open_mainfile(filepath=str(tmp_path / "tree.blend"))
     bpy.ops.wm.save_mainfile()
