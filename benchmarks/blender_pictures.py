@@ -317,7 +317,7 @@ def print_layers():
         yield 1.0
     assert called(bpy.ops.mu.print_layer) == {"FINISHED"}
     root().mu_print.layer = 0.42
-    seen_from(20)
+    seen_from(20, wider=0.6)
     yield from scrolled(9)
     shot("print-layers")
 
