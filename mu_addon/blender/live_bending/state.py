@@ -226,10 +226,12 @@ def _coloured(root: Any) -> None:
     live, wanted = of(root), root.mu_live.colour != PLAIN
     if wanted:
         viewports.show_colours()
-    if live is None or live.shape is None:
+    if live is None:
         return
     pose(root, live)
-    if wanted and live.current is not None and not live.current.fields:
+    # A request that runs may be of before they were wanted; one that is due asks for them.
+    lacking = live.current is None or not live.current.fields
+    if wanted and lacking and live.design and live.due_s is None:
         live.due_s = time.monotonic()
         _tick_soon()
 

@@ -22,7 +22,7 @@ BETTER = "Mean deviation [mm], smaller is better"
 """Note on a ranking's numbers, next to the lattice and in the panel."""
 ESTIMATED = "Mean deviation [mm], estimated: no path is solved yet"
 UNDECIDED = "≈: undecided, closer than the mesh's error"
-AT_LEAST = "≥ (grey): not solved further, cannot be the best"
+BOUND = "≥: cannot be the best, not solved further"
 BESIDE = 190
 """Pixels taken by the legend of a field, to the left of this one."""
 
@@ -33,7 +33,7 @@ def lines(known: ranking.Known) -> list[str]:
         return ["Mean deviation", "stale (grey): ranked with other parameters"]
     if known.estimated:
         return [ESTIMATED]
-    notes = {UNDECIDED: known.tied, AT_LEAST: known.at_least}
+    notes = {UNDECIDED: known.tied, BOUND: known.at_least}
     return [BETTER, *(note for note, wanted in notes.items() if wanted)]
 
 

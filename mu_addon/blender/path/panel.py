@@ -11,10 +11,9 @@ from ..shared.registration import attach
 from ..shared.wording import anchors_of, path_symbol
 from ..unit.base_classes import DONE, UnitPanel, parameters
 from . import ranking
-from .legend import BETTER, ESTIMATED, UNDECIDED
+from .legend import BETTER, BOUND, ESTIMATED, UNDECIDED
 from .picking import selected_candidate
 
-BOUND = "≥: cannot be the best, not solved further"
 ORDERS = (
     ("name", "By Name", "As they stand beside the unit"),
     ("deviation", "By Deviation", "The one that disturbs the motion least first"),

@@ -148,6 +148,13 @@ def test_a_unit_bends_at_the_sliders_pressure_and_anew_after_a_change(tmp_path):
     root.mu_live.on = True
     live._tick()
     assert words.words(root) == "Bending... (dim: a unit like it)"
+    # Colours that are asked for while it bends come with the shape.
+    time.sleep(live.RESTS_S)
+    live._tick()
+    assert live.of(root).number == 1
+    root.mu_live.colour = "largest_stretch"
+    coloured(root)
+    assert live.of(root).current is not None
     root.mu_live.on = False
 
 

@@ -3,6 +3,7 @@
 import json
 from types import SimpleNamespace
 
+import attrs
 import bpy
 import numpy as np
 import pytest
@@ -513,7 +514,10 @@ def test_candidates_say_their_rank(study):
     assert [some.rank(name) for name in (order[2], order[3], last, worst)] == ["#3", "", "", ""]
     words = drawn([path_panel.MU_PT_path])
     assert f"≥ {bound:.3f}" in words
-    assert path_panel.BOUND in words
+    assert path_legend.BOUND in words
+    assert path_legend.BOUND in path_legend.lines(some)
+    assert len(path_legend.marks(some)) >= 2
+    assert path_legend.marks(attrs.evolve(some, j={order[0]: 0.3})) == [], "a ramp of one value says nothing"
     assert path_legend.label(root, some, last)[-1] == f"≥ {bound:.3f}"
     # Before any path is solved there are estimates.
     estimated = {name: value for name, value in found.items() if name not in ("J_hat_mm", "chosen")}

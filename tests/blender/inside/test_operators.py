@@ -232,7 +232,9 @@ def test_the_head_says_what_a_unit_comes_to():
 
 def test_path_select_and_stale_names():
     root = add()
+    bpy.ops.mu.solid()
     assert bpy.ops.mu.path(name="alpha4") == {"FINISHED"}
+    assert root.mu_unit.show == "preview", "where the waveguide is seen"
     bar = points_of(root, "waveguide")
     assert len(bar) % 8 == 0
     slots = [root.data.materials[face.material_index].name for face in root.data.polygons]
