@@ -5,8 +5,8 @@
 (MU_BLENDER_UI as of tests/blender/test_installed.py; it needs ImageMagick's `import`.)
 From an empty scene to a unit that bends while it is shaped, its paths ranked quickly, the painted deviation
 and the motion: each step by the extension's own operators, a picture of the whole window after it. Blender
-itself makes `film.webm` of them. What takes minutes, the simulation, is seen at some of its moments. In background
-(`blender -b -P benchmarks/blender_film.py`) the film is made anew of the pictures in MU_FILM.
+itself makes `film.webm` of them. What takes minutes, the simulation, is seen at some of its moments. In
+background (`blender -b -P benchmarks/blender_film.py`) the film is made anew of the pictures in MU_FILM.
 """
 
 import json
