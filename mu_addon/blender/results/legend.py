@@ -34,7 +34,7 @@ LEAST = 40
 LINE = 18
 """Height of a line of text."""
 NO_COLOURS = ("This view's shading shows no colours:", "press Show Colours in its header")
-AS_SAVED = "linked without its run, coloured as at the frame that was saved"
+AS_SAVED = "its run is not here, coloured as at the frame that was saved"
 TEXT = (0.92, 0.92, 0.92, 1.0)
 
 
