@@ -265,10 +265,14 @@ class Execution(Shown):
         self._done.add(task)
         if task in self._waiting:
             self._waiting.remove(task)
+        self._go_on()
+        return message
+
+    def _go_on(self) -> None:
+        """Let sets grow that wait for what is known now, and begin others: also once one has ended."""
         for name in [*self._growth]:
             self._grow(name)
         self._begin_growth()
-        return message
 
     def _begin_growth(self) -> None:
         """Begin the growth of the sets for which all is known that they take."""
@@ -284,8 +288,9 @@ class Execution(Shown):
                 self._growth[name] = growth, next(growth)
             except (StopIteration, Dropped):
                 self.results.growing.discard(name)
-            else:
-                self._grow(name)
+                return self._go_on()
+            self._grow(name)
+        return None
 
     def _tasks_of(self, name: str) -> list[Task]:
         return [(name, member) for member in self.results.members.get(name, [])]
@@ -314,7 +319,7 @@ class Execution(Shown):
             self._grew.update((name, member) for member in new)
             self._waiting += [(name, member) for member in new]
         if name not in self.results.growing:
-            self._begin_growth()
+            self._go_on()
 
     def _asked_next(self, growth: Growth, tasks: Sequence[Task], awaits: bool) -> Sequence[Any] | str:
         """What a growth asks for after the results of some tasks, or after Dropped of one without."""

@@ -476,6 +476,51 @@ def test_a_likely_member_without_a_result_leaves_the_right_ones(tmp_path):
 
 
 @attrs.frozen(kw_only=True, eq=False)
+class Waits(Study):
+    """Squares of a number and of one that is known once a second set, which stays empty, has ended."""
+
+    name = "waits"
+    files = MappingProxyType({})
+
+    def heading(self):
+        return "Waits", ""
+
+    @stage("squares", over=Over(("x",), lambda s: [], grows=lambda s: s.numbers()))
+    def squares(self, x: int) -> int:
+        return x * x
+
+    @stage("squares")
+    def last(self) -> int:
+        return 3
+
+    @stage("squares", over=Over(("y",), lambda s: [], grows=lambda s, last: iter(()), after=("last",)))
+    def more(self, y: int) -> int:
+        return y
+
+    @intermediate()
+    def right(self, last: int, more: dict) -> list:
+        return [last, *more]
+
+    @stage("squares")
+    def added(self, squares: dict) -> int:
+        return sum(squares.values())
+
+    def numbers(self):
+        yield [2]
+        yield (yield "right")
+
+    @section()
+    def result(self, added):
+        yield Fact("sum", added, key="sum")
+
+
+def test_a_set_goes_on_when_another_ends_that_never_had_a_member(tmp_path):
+    context = RunContext(Progress())
+    Execution(Waits(), tmp_path, context).run()
+    assert context.summary["sum"] == 13
+
+
+@attrs.frozen(kw_only=True, eq=False)
 class Throws(Study):
     """Throw at marks; those at the same place have one result."""
 
